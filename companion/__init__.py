@@ -1,0 +1,1 @@
+"""What flies on the drone: reads vehicle state and LiDAR, sends offboard position setpoints."""

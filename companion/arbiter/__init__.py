@@ -1,0 +1,1 @@
+"""Who flies: Travel, RL or Landing? Depends on nothing learned."""

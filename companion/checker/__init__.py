@@ -1,0 +1,1 @@
+"""May this polyline be flown? Keep, modify or refuse; depends on nothing learned."""

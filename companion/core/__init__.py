@@ -1,0 +1,1 @@
+"""The ground floor: values, frames, geometry, map, parameters, MAVLink codec, transports."""

@@ -1,0 +1,1 @@
+"""Which setpoint follows the line, the path or the landing profile?"""

@@ -1,0 +1,1 @@
+"""What does the vehicle say? Messages in, one tick's inputs out."""

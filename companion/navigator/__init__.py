@@ -1,0 +1,1 @@
+"""One tick, pure: memory and inputs in, memory, setpoint and record out."""

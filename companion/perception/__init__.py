@@ -1,0 +1,1 @@
+"""What is around the vehicle, and how safe is it?"""

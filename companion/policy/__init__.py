@@ -1,0 +1,1 @@
+"""Which five waypoints lead past the hazard?"""

@@ -1,0 +1,1 @@
+"""What needs both houses: worlds, missions, operator, runner, reports, command line."""
