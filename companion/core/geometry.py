@@ -1,0 +1,229 @@
+"""How far along a polyline, how far from it, and how far can a disc follow it before it touches a point?
+
+Plane geometry in (north, east) metres, pure. Polylines are (k, 2) arrays, k >= 1; repeated vertices are allowed. Few
+vertices are walked in plain floats (a tick has no time for many tiny arrays); many points are handled as arrays.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.core.types import F64
+
+NEARER_M = 0.01  # a point already inside the radius at the start counts once the path comes this much nearer
+
+
+class Projection(NamedTuple):
+    """Where a position is with respect to a polyline."""
+
+    s_m: float  # arc length of the nearest point
+    lateral_m: float  # signed offset, right of the direction of travel is positive
+    distance_m: float  # to the nearest point
+
+
+class Segment(NamedTuple):
+    """One straight piece of a polyline: start, unit direction, length, arc length at its start."""
+
+    north_m: float
+    east_m: float
+    dir_north: float
+    dir_east: float
+    length_m: float
+    s_m: float
+
+
+def segments(path_ned_m: F64) -> list[Segment]:
+    """The pieces of positive length, in order; empty for a polyline that is a single place."""
+    pieces: list[Segment] = []
+    s = 0.0
+    vertices: list[list[float]] = path_ned_m.tolist()
+    north, east = vertices[0]
+    for next_north, next_east in vertices[1:]:
+        dn, de = next_north - north, next_east - east
+        length = math.hypot(dn, de)
+        if length > 0.0:
+            pieces.append(Segment(north, east, dn / length, de / length, length, s))
+            s += length
+            north, east = next_north, next_east
+    return pieces
+
+
+def arc_lengths(path_ned_m: F64) -> F64:
+    """Arc length (k,) of each vertex."""
+    steps = np.hypot(np.diff(path_ned_m[:, 0]), np.diff(path_ned_m[:, 1]))
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def length(path_ned_m: F64) -> float:
+    """Length of the whole polyline."""
+    pieces = segments(path_ned_m)
+    return pieces[-1].s_m + pieces[-1].length_m if pieces else 0.0
+
+
+def project(path_ned_m: F64, pos_ned_m: F64, s_min_m: float = 0.0, s_max_m: float = math.inf) -> Projection:
+    """Nearest place of the polyline with arc length in [s_min_m, s_max_m]; the first of equally near ones."""
+    north, east = float(pos_ned_m[0]), float(pos_ned_m[1])
+    pieces = segments(path_ned_m)
+    if not pieces:
+        return Projection(0.0, 0.0, math.hypot(north - float(path_ned_m[0, 0]), east - float(path_ned_m[0, 1])))
+    end_s = pieces[-1].s_m + pieces[-1].length_m
+    low, high = min(max(s_min_m, 0.0), end_s), min(max(s_max_m, s_min_m, 0.0), end_s)
+    best = Projection(low, math.nan, math.inf)
+    for piece in pieces:
+        first, last = max(low - piece.s_m, 0.0), min(high - piece.s_m, piece.length_m)
+        if first > last:
+            continue
+        dn, de = north - piece.north_m, east - piece.east_m
+        along = min(max(dn * piece.dir_north + de * piece.dir_east, first), last)
+        distance = math.hypot(dn - along * piece.dir_north, de - along * piece.dir_east)
+        if distance < best.distance_m:
+            lateral = piece.dir_north * de - piece.dir_east * dn
+            best = Projection(piece.s_m + along, lateral, distance)
+    return best
+
+
+def point_at(path_ned_m: F64, s_m: float) -> F64:
+    """The place (2,) at arc length s_m; the ends beyond the ends."""
+    piece = segment_at(segments(path_ned_m), s_m)
+    if piece is None:
+        return np.array(path_ned_m[0], dtype=np.float64)
+    along = min(max(s_m - piece.s_m, 0.0), piece.length_m)
+    return np.array([piece.north_m + along * piece.dir_north, piece.east_m + along * piece.dir_east])
+
+
+def tangent_at(path_ned_m: F64, s_m: float) -> F64:
+    """Unit direction (2,) at arc length s_m, at a vertex that of the piece ahead; zeros for a single place."""
+    piece = segment_at(segments(path_ned_m), s_m)
+    return np.zeros(2) if piece is None else np.array([piece.dir_north, piece.dir_east])
+
+
+def segment_at(pieces: list[Segment], s_m: float) -> Segment | None:
+    """The piece that holds arc length s_m, the first or last one beyond the ends; None if there is none."""
+    found: Segment | None = None
+    for piece in pieces:
+        if found is not None and piece.s_m > s_m:
+            break
+        found = piece
+    return found
+
+
+def part(path_ned_m: F64, s_from_m: float, s_to_m: float = math.inf) -> F64:
+    """The polyline between two arc lengths, both clamped to its ends; at least one vertex."""
+    s = arc_lengths(path_ned_m)
+    low = min(max(s_from_m, 0.0), float(s[-1]))
+    high = min(max(s_to_m, low), float(s[-1]))
+    inside = path_ned_m[(s > low) & (s < high)]
+    ends = [point_at(path_ned_m, low), point_at(path_ned_m, high)]
+    return np.concatenate((ends[:1], inside, ends[1:])) if high > low else np.array(ends[:1])
+
+
+def resample(path_ned_m: F64, spacing_m: float) -> F64:
+    """Vertices at equal arc length, not farther apart than spacing_m; first and last vertex kept."""
+    s = arc_lengths(path_ned_m)
+    count = max(1, math.ceil(float(s[-1]) / spacing_m - 1e-9))
+    at = np.linspace(0.0, float(s[-1]), count + 1)
+    return np.stack((np.interp(at, s, path_ned_m[:, 0]), np.interp(at, s, path_ned_m[:, 1])), axis=1)
+
+
+def points_near(path_ned_m: F64, points_ned_m: F64, reach_m: float) -> F64:
+    """The points inside the bounding box of the polyline grown by reach_m: every point within reach_m is among them."""
+    if len(points_ned_m) == 0:
+        return points_ned_m
+    low, high = path_ned_m.min(axis=0).tolist(), path_ned_m.max(axis=0).tolist()
+    north, east = points_ned_m[:, 0], points_ned_m[:, 1]
+    inside = (north >= low[0] - reach_m) & (north <= high[0] + reach_m)
+    inside &= (east >= low[1] - reach_m) & (east <= high[1] + reach_m)
+    near: F64 = points_ned_m[inside]
+    return near
+
+
+def points_to_polyline_distance(path_ned_m: F64, points_ned_m: F64) -> F64:
+    """Distance (n,) of each point to the polyline."""
+    pieces = segments(path_ned_m)
+    if not pieces:
+        alone: F64 = np.hypot(points_ned_m[:, 0] - path_ned_m[0, 0], points_ned_m[:, 1] - path_ned_m[0, 1])
+        return alone
+    along, lateral, lengths = _in_segments(pieces, points_ned_m)
+    beyond = along - np.minimum(np.maximum(along, 0.0), lengths)
+    distance: F64 = np.sqrt((beyond * beyond + lateral * lateral).min(axis=0))
+    return distance
+
+
+def nearest_distance(path_ned_m: F64, points_ned_m: F64, reach_m: float = math.inf) -> float:
+    """Distance from the polyline to the nearest point; inf if none is within reach_m."""
+    near = points_near(path_ned_m, points_ned_m, reach_m) if reach_m < math.inf else points_ned_m
+    if len(near) == 0:
+        return math.inf
+    nearest = float(points_to_polyline_distance(path_ned_m, near).min())
+    return nearest if nearest <= reach_m else math.inf
+
+
+def required_distance(start_ned_m: F64, points_ned_m: F64, radius_m: float, floor_m: float = 0.0) -> F64:
+    """Distance (n,) that a disc leaving ``start`` must keep from each point.
+
+    The radius; less for points that are inside it already: they must not come nearer by ``NEARER_M``. Down to
+    ``floor_m`` that centimetre is given; a point inside the floor may only get farther away.
+    """
+    now: F64 = np.hypot(points_ned_m[:, 0] - start_ned_m[0], points_ned_m[:, 1] - start_ned_m[1])
+    given = np.maximum(now - NEARER_M, np.minimum(floor_m, now - 1e-6))
+    required: F64 = np.minimum(radius_m, np.maximum(given, 0.0))
+    return required
+
+
+def swept_free_length(
+    path_ned_m: F64, points_ned_m: F64, radius_m: float, s_m: float = 0.0, horizon_m: float = math.inf
+) -> float:
+    """How far beyond arc length s_m a disc follows the polyline until it touches a point.
+
+    Returns the remaining length (at most horizon_m) if it touches none. Touching is a distance below radius_m; see
+    ``required_distance`` for points that are inside the radius at s_m already.
+    """
+    ahead = part(path_ned_m, s_m, s_m + horizon_m) if s_m > 0.0 or horizon_m < math.inf else path_ned_m
+    pieces = segments(ahead)
+    if not pieces:
+        return 0.0
+    whole = pieces[-1].s_m + pieces[-1].length_m
+    near = points_near(ahead, points_ned_m, radius_m)
+    if len(near) == 0:
+        return whole
+    return min(whole, _first_contact(pieces, near, required_distance(ahead[0], near, radius_m)))
+
+
+def path_clear(path_ned_m: F64, points_ned_m: F64, radius_m: float, floor_m: float = 0.0) -> bool:
+    """Can a disc follow the whole polyline without touching? As ``swept_free_length``, with a floor."""
+    near = points_near(path_ned_m, points_ned_m, radius_m)
+    if len(near) == 0:
+        return True
+    required = required_distance(path_ned_m[0], near, radius_m, floor_m)
+    return bool((points_to_polyline_distance(path_ned_m, near) >= required).all())
+
+
+def mask_within(points_ned_m: F64, centre_ned_m: F64, radius_m: float) -> NDArray[np.bool_]:
+    """Which points (n,) lie within radius_m of a place."""
+    dn, de = points_ned_m[:, 0] - centre_ned_m[0], points_ned_m[:, 1] - centre_ned_m[1]
+    within: NDArray[np.bool_] = dn * dn + de * de <= radius_m * radius_m
+    return within
+
+
+def _first_contact(pieces: list[Segment], points_ned_m: F64, required_m: F64) -> float:
+    """Smallest arc length at which a point is nearer than required; inf if none ever is."""
+    along, lateral, lengths = _in_segments(pieces, points_ned_m)
+    chord = required_m * required_m - lateral * lateral
+    half = np.sqrt(np.maximum(chord, 0.0))
+    touched = (chord > 0.0) & (along + half > 0.0) & (along - half < lengths)
+    if not touched.any():
+        return math.inf
+    start_s = np.array([piece.s_m for piece in pieces])[:, None]
+    entry: F64 = start_s + np.maximum(along - half, 0.0)
+    return float(entry[touched].min())
+
+
+def _in_segments(pieces: list[Segment], points_ned_m: F64) -> tuple[F64, F64, F64]:
+    """Coordinates (m, n) of every point along and right of every piece, and the lengths (m, 1)."""
+    table = np.array(pieces)
+    dn = points_ned_m[:, 0] - table[:, 0:1]
+    de = points_ned_m[:, 1] - table[:, 1:2]
+    tn, te = table[:, 2:3], table[:, 3:4]
+    return dn * tn + de * te, tn * de - te * dn, table[:, 4:5]
