@@ -10,8 +10,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, Strict, model_validator
 
 from companion.core.params import nearest
+from mission.errors import InputError
 from mission.plan_file import read_plan
-from mission.strict_yaml import InputError, StrictModel, checked, read_yaml
+from mission.strict_yaml import StrictModel, checked, read_yaml
 
 Real = Annotated[float, Strict()]
 Turbulence = Literal["none", "light", "moderate", "severe"]

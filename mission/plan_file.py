@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mission.strict_yaml import InputError
+from mission.errors import InputError
 
 WGS84_A_M = 6378137.0  # semi-major axis (NIMA TR8350.2)
 WGS84_E2 = 6.69437999014e-3  # first eccentricity squared

@@ -9,10 +9,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from companion.core.params import nearest
-
-
-class InputError(ValueError):
-    """Something that a person handed in is wrong; the text is one line that names file, key and value."""
+from mission.errors import InputError
 
 
 class StrictModel(BaseModel):
