@@ -1,0 +1,150 @@
+"""How do chunks of bytes become MAVLink messages, and back? Survives garbage: it is counted, never raised.
+
+The framing is our own: pymavlink throws a whole bad frame away, and with it the good ones that follow a stray start
+byte. Here a bad frame costs one byte and the search goes on.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink.dialects.v20 import common as mav
+
+from companion.core.clock import Clock, SystemClock
+from companion.core.tlog import TlogWriter, packet_length
+from companion.core.transport import Transport, wait_readable
+
+Message = Any  # a MAVLink_*_message object; pymavlink's classes share no useful static type
+
+BUFFER_MAX_BYTES = 1 << 16  # a stream without a single packet in this much is thrown away
+
+
+@dataclass(slots=True)
+class LinkCounts:
+    """What a connection has seen so far."""
+
+    received: int = 0  # messages delivered
+    unknown: int = 0  # packets with an id that the dialect does not know
+    bad_bytes: int = 0  # bytes that belonged to no valid packet
+    lost: int = 0  # gaps in the senders' sequence numbers
+    sent: int = 0
+
+
+class PacketParser:
+    """Cuts a stream of chunks into decoded messages."""
+
+    def __init__(self, counts: LinkCounts | None = None) -> None:
+        self.counts = counts or LinkCounts()
+        self._mavlink = mav.MAVLink(None)
+        self._buffer = bytearray()
+
+    def feed(self, chunk: bytes) -> list[Message]:
+        """Every message completed by ``chunk``."""
+        if self._buffer and self._starts_packet(chunk):
+            self.counts.bad_bytes += len(self._buffer)  # what was left over is no beginning of anything
+            self._buffer.clear()
+        self._buffer += chunk
+        messages: list[Message] = []
+        at = 0
+        while at < len(self._buffer):
+            length = packet_length(self._buffer[at : at + 3])
+            if length < 0 or (length > 0 and at + length > len(self._buffer)):
+                break
+            message = self._decode(at, length) if length else None
+            if message is None:
+                self.counts.bad_bytes += 1
+                at += 1
+                continue
+            at += length
+            if message.get_msgId() == mav.MAVLINK_MSG_ID_UNKNOWN:
+                self.counts.unknown += 1
+            else:
+                messages.append(message)
+        del self._buffer[:at]
+        self._limit_buffer()
+        self.counts.received += len(messages)
+        return messages
+
+    def _starts_packet(self, chunk: bytes) -> bool:
+        """True when ``chunk`` by itself begins with a whole packet of a known kind."""
+        length = packet_length(chunk[:3])
+        if length <= 0 or length > len(chunk):
+            return False
+        message = decode_packet(self._mavlink, chunk[:length])
+        return message is not None and message.get_msgId() != mav.MAVLINK_MSG_ID_UNKNOWN
+
+    def _decode(self, at: int, length: int) -> Message | None:
+        message = decode_packet(self._mavlink, self._buffer[at : at + length])
+        if message is None or message.get_msgId() != mav.MAVLINK_MSG_ID_UNKNOWN:
+            return message
+        # The checksum of an unknown id cannot be tested: believe it only when a packet or nothing follows.
+        end = at + length
+        return message if end == len(self._buffer) or packet_length(self._buffer[end : end + 3]) else None
+
+    def _limit_buffer(self) -> None:
+        if len(self._buffer) > BUFFER_MAX_BYTES:
+            self.counts.bad_bytes += len(self._buffer)
+            self._buffer.clear()
+
+
+def decode_packet(mavlink: mav.MAVLink, packet: bytes | bytearray) -> Message | None:
+    """The message of one whole packet, or None when its length or checksum is wrong."""
+    try:
+        return mavlink.decode(bytearray(packet))
+    except mav.MAVError:
+        return None
+
+
+class Connection:
+    """A transport that speaks MAVLink 2 under one system and component id, with an optional log."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        system: int,
+        component: int,
+        tlog: TlogWriter | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self.transport = transport
+        self.counts = LinkCounts()
+        self._mavlink = mav.MAVLink(None, srcSystem=system, srcComponent=component)
+        self._parser = PacketParser(self.counts)
+        self._tlog = tlog
+        self._clock = clock or SystemClock()
+        self._sequence: dict[tuple[int, int], int] = {}
+
+    def send(self, *messages: Message) -> None:
+        """Send messages as one chunk (one datagram on UDP)."""
+        chunk = b""
+        for message in messages:
+            packet = message.pack(self._mavlink)
+            self._mavlink.seq = (self._mavlink.seq + 1) % 256
+            if self._tlog is not None:
+                self._tlog.write(self._clock.wall_us(), packet)
+            chunk += packet
+        self.counts.sent += len(messages)
+        self.transport.send(chunk)
+
+    def receive(self, timeout_s: float = 0.0) -> list[Message]:
+        """Messages that have arrived, oldest first; waits up to ``timeout_s`` for the first."""
+        if timeout_s > 0.0:
+            wait_readable([self.transport], timeout_s, self._clock)
+        messages = [message for chunk in self.transport.receive() for message in self._parser.feed(chunk)]
+        for message in messages:
+            self._count_lost(message)
+            if self._tlog is not None:
+                self._tlog.write(self._clock.wall_us(), message.get_msgbuf())
+        return messages
+
+    def close(self) -> None:
+        """Close the transport; the log belongs to whoever opened it."""
+        self.transport.close()
+
+    def _count_lost(self, message: Message) -> None:
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        sequence = message.get_seq()
+        expected = self._sequence.get(sender)
+        self._sequence[sender] = (sequence + 1) % 256
+        if expected is not None:
+            gap = (sequence - expected) % 256
+            self.counts.lost += gap if gap < 128 else 0  # a larger gap is a packet that came late or twice
