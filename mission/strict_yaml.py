@@ -39,6 +39,14 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return data
 
 
+def write_yaml(path: Path, data: dict[str, Any]) -> None:
+    """``data`` (plain values only) as block YAML."""
+    yaml = YAML(typ="safe")
+    yaml.default_flow_style = False
+    with path.open("w", encoding="utf-8") as file:
+        yaml.dump(data, file)
+
+
 def checked(model: type[Model], data: dict[str, Any], where: str) -> Model:
     """``data`` as a ``model``. Raises InputError about the first thing that is wrong, prefixed with ``where``."""
     try:

@@ -1,0 +1,80 @@
+"""Which options do the commands share, and how is a missing extra told?"""
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from mission.errors import InputError
+
+EXTRA_MODULES = {"sitl": ("jsbsim", "mavsdk", "numba", "matplotlib")}  # as pyproject.toml lists them
+INSTANCE_MAX = 9  # PX4's ports of instance 10 run into the next range
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Draws wind, start, noise and movers.")]
+Speed = Annotated[str, typer.Option("--speed", help="Times real time (1, 20, ...), or 'max' = lockstep.")]
+Lockstep = Annotated[bool, typer.Option("--lockstep", help="The vehicle waits for the answer to each scan.")]
+Instance = Annotated[int, typer.Option("--instance", min=0, max=INSTANCE_MAX, help="Added to every port.")]
+ParamSet = Annotated[
+    list[str] | None, typer.Option("--param", metavar="GROUP.FIELD=VALUE", help="Override one parameter; repeatable.")
+]
+ParamFile = Annotated[Path | None, typer.Option("--params", metavar="FILE", help="YAML with {group: {field: value}}.")]
+
+
+def require_extra(extra: str, command: str) -> None:
+    """Raise InputError with the line that says what to install, when a package of the extra is missing."""
+    if any(importlib.util.find_spec(module) is None for module in EXTRA_MODULES[extra]):
+        raise InputError(f"swiftnav {command} needs the '{extra}' extra: pip install 'swiftnav[{extra}]'")
+
+
+def parse_speed(text: str, lockstep: bool) -> float | None:
+    """Factor over real time; None = lockstep. Raises InputError."""
+    if text == "max" or lockstep:
+        return None
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = float("nan")
+    if not 0.1 <= speed <= 100.0:
+        raise InputError(f"--speed '{text}' wants a number in [0.1, 100] or 'max'")
+    return speed
+
+
+def parse_overrides(file: Path | None, settings: list[str] | None) -> dict[str, dict[str, Any]]:
+    """The parameter file with the ``--param`` settings on top, nested, unchecked. Raises InputError."""
+    from mission.strict_yaml import read_yaml
+
+    overrides: dict[str, dict[str, Any]] = read_yaml(file) if file else {}
+    for setting in settings or []:
+        key, separator, text = setting.partition("=")
+        group, dot, field = key.partition(".")
+        if not (separator and dot):
+            raise InputError(f"--param '{setting}' wants GROUP.FIELD=VALUE")
+        overrides[group] = {**(overrides.get(group) or {}), field: _value(text)}
+    return overrides
+
+
+def print_json(value: Any) -> None:
+    """One JSON object on stdout; infinite and NaN become null, which JSON can say."""
+    typer.echo(json.dumps(json_ready(value)))
+
+
+def json_ready(value: Any) -> Any:
+    """``value`` with what JSON cannot say turned into null."""
+    if isinstance(value, dict):
+        return {str(key): json_ready(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_ready(item) for item in value]
+    if isinstance(value, float) and not -float("inf") < value < float("inf"):
+        return None
+    return value
+
+
+def _value(text: str) -> Any:
+    """A number or truth value as YAML would read it, else the text."""
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
