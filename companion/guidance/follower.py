@@ -39,6 +39,7 @@ class Target:
     speed_m_s: float  # along the path, limits applied
     down_m: float
     yaw_rad: float
+    course_rad: float | None = None  # direction of the velocity where a line law corrects it; None: along the path
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,10 @@ def follow(path_ned_m: F64, state: VehicleState, s_min_m: float, target: Target,
     at = progress(path_ned_m, state.pos_ned_m, s_min_m, params)
     pieces = geometry.segments(path_ned_m)
     speed = target.speed_m_s * _share_off_path(at.distance_m, params)
-    vel_n, vel_e = _velocity(pieces, at.s_m + speed * params.lead_s, speed, params)
+    if target.course_rad is None:
+        vel_n, vel_e = _velocity(pieces, at.s_m + speed * params.lead_s, speed, params)
+    else:
+        vel_n, vel_e = speed * math.cos(target.course_rad), speed * math.sin(target.course_rad)
     place_n, place_e = _place(pieces, at.s_m + speed * params.delay_s, path_ned_m)
     here_n, here_e = float(state.pos_ned_m[0]), float(state.pos_ned_m[1])
     off_n, off_e = _limited(place_n - here_n, place_e - here_e, params.offset_max_m)

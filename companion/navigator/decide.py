@@ -1,0 +1,119 @@
+"""Which polyline does RL mode fly next? Ask the policy, let the checker decide; pure; local NED."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from companion.checker.checker import CheckQuery, Verdict, check, recheck
+from companion.core import geometry
+from companion.core.params import ParamError, nearest
+from companion.core.task import Task
+from companion.core.types import F64, VehicleState
+from companion.guidance import follower
+from companion.navigator.memory import Engagement, Memory, Path
+from companion.navigator.params import Params
+from companion.perception.observation import observation
+from companion.perception.perceive import Percept
+from companion.policy.expert import ExpertParams, GeometricExpert
+from companion.policy.interface import Policy, Query
+
+ESCAPE_M = 2.0  # length of the escape segment into the widest free sector
+ESCAPE_WAYS = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """One RL decision, for the record."""
+
+    proposal_ne_m: F64 | None  # (k, 2)
+    verdict: Verdict | None  # None: the policy had no proposal
+
+
+def due(engaged: Engagement, state: VehicleState, percept: Percept, task: Task, params: Params) -> bool:
+    """Is a new decision needed: none yet, used up, too old, or refused by what was seen since?"""
+    if state.t_s - engaged.tried_t_s < params.policy.retry_s - 1e-6:
+        return False
+    path = engaged.path
+    if path is None or state.t_s - path.decided_t_s >= params.policy.horizon_s - 1e-6:
+        return True
+    end = path.vertices_ne_m[-1]
+    left_m = geometry.length(path.vertices_ne_m) - path.s_m
+    to_goal = math.hypot(end[0] - task.goal_ned_m[0], end[1] - task.goal_ned_m[1])
+    used_up = left_m < params.policy.used_up_m and to_goal > params.policy.used_up_m
+    return used_up or not recheck(path.vertices_ne_m, path.s_m, percept.points_ne_m, params.checker)
+
+
+def decide(
+    memory: Memory, engaged: Engagement, state: VehicleState, percept: Percept, task: Task, params: Params
+) -> tuple[Memory, Engagement, Decision]:
+    """Ask once; the accepted path, or None (brake and hold), goes into the engagement."""
+    prefix = _prefix(engaged, state, params)
+    query = Query(
+        state,
+        task.goal_ned_m,
+        percept.grid,
+        params.vehicle.radius_m,
+        prefix,
+        observation(state, percept.obstacles_ne_m, engaged.start_ne_m, task.goal_ned_m),
+    )
+    proposal, remembered = policy_named(params.policy.name, params).propose(query, memory.policy)
+    memory = replace(memory, policy=remembered, decisions=memory.decisions + 1)
+    engaged = replace(engaged, tried_t_s=state.t_s)
+    waypoints = None if proposal is None else proposal.waypoints_ne_m
+    verdict = check(
+        CheckQuery(
+            start_ned_m=prefix[0],
+            goal_ned_m=task.goal_ned_m,
+            points_ned_m=percept.points_ne_m,
+            proposal_ned_m=waypoints,
+            escape_ned_m=_escape(state.pos_ned_m[:2], task.goal_ned_m, percept, params),
+        ),
+        params.checker,
+    )
+    path = None
+    if verdict.path_ned_m is not None:
+        path = Path(verdict.path_ned_m, 0.0, verdict.margin_m, state.t_s)
+    return memory, replace(engaged, path=path), Decision(waypoints, verdict)
+
+
+def policy_named(name: str, params: Params) -> Policy:
+    """The policy of that name. Raises ParamError with the nearest name."""
+    if name != GeometricExpert.name:
+        raise ParamError(f"unknown policy '{name}'{nearest(name, [GeometricExpert.name])}")
+    return _expert(params.expert, params)
+
+
+@lru_cache(maxsize=8)
+def _expert(expert: ExpertParams, params: Params) -> Policy:
+    return GeometricExpert(expert, params.map)
+
+
+def _prefix(engaged: Engagement, state: VehicleState, params: Params) -> F64:
+    """The stretch of the old path that is flown while the new one is not there yet; else just the vehicle's place.
+
+    A path that began at the vehicle each time would forgive every tracking error and cut every corner.
+    """
+    path = engaged.path
+    if path is None or engaged.stop is not None:
+        return state.pos_ned_m[None, :2].copy()
+    at = follower.progress(path.vertices_ne_m, state.pos_ned_m, path.s_m, params.follower)
+    if not at.distance_m < params.policy.rejoin_m:
+        return state.pos_ned_m[None, :2].copy()
+    speed = math.hypot(state.vel_ned_m_s[0], state.vel_ned_m_s[1])
+    return geometry.part(path.vertices_ne_m, at.s_m, at.s_m + speed * params.policy.lead_s)
+
+
+def _escape(pos_ne_m: F64, goal_ne_m: F64, percept: Percept, params: Params) -> F64:
+    """(1, 2) end of a short segment into the direction that is free the farthest, goalwards among equals."""
+    goal_course = math.atan2(goal_ne_m[1] - pos_ne_m[1], goal_ne_m[0] - pos_ne_m[0])
+    best, best_free = pos_ne_m, -1.0
+    for way in range(ESCAPE_WAYS):
+        turn = math.tau * ((way + 1) // 2) / ESCAPE_WAYS * (1 if way % 2 else -1)
+        direction = np.array([math.cos(goal_course + turn), math.sin(goal_course + turn)])
+        ray = np.stack([pos_ne_m, pos_ne_m + ESCAPE_M * direction])
+        free = geometry.swept_free_length(ray, percept.points_ne_m, params.vehicle.radius_m + params.expert.tight_m)
+        if free > best_free + 0.05:
+            best, best_free = pos_ne_m + free * direction, free
+    return best[None]

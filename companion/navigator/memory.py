@@ -1,0 +1,56 @@
+"""What does the navigator remember from tick to tick? One immutable value."""
+
+from dataclasses import dataclass
+
+from companion.arbiter import arbiter
+from companion.core import gridmap
+from companion.core.gridmap import GridMap
+from companion.core.types import F64
+from companion.guidance.landing import LandingState
+from companion.guidance.limits import HoldMemory
+from companion.guidance.line import GuidanceLine
+from companion.navigator.params import Params
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A polyline that passed the checker, and how far along it the vehicle is."""
+
+    vertices_ne_m: F64  # (k, 2)
+    s_m: float
+    margin_m: float  # beyond the radius, at which it passed
+    decided_t_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Engagement:
+    """What was frozen when the autopilot went to OFFBOARD, and who flies since."""
+
+    start_ne_m: F64  # (2,)
+    down_m: float  # cruise altitude
+    engaged_t_s: float
+    arbiter: arbiter.ArbiterState
+    line: GuidanceLine  # of the present or last Travel
+    line_s_m: float
+    path: Path | None  # RL only
+    tried_t_s: float  # last decision, accepted or not
+    landing: LandingState | None
+    stop: HoldMemory | None  # while braking or holding
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """Everything remembered; ``engaged`` only while the autopilot reports OFFBOARD and armed."""
+
+    grid: GridMap
+    ticks: int
+    t_s: float
+    yaw_sp_rad: float
+    policy: F64 | None  # whatever the policy wants to see again
+    decisions: int
+    engaged: Engagement | None
+
+
+def start(params: Params) -> Memory:
+    """Nothing seen, nobody flies."""
+    return Memory(gridmap.empty(params.map), 0, 0.0, 0.0, None, 0, None)

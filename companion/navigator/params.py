@@ -1,0 +1,52 @@
+"""Which tunables does the companion have? Every group in one value; the full set goes into every log."""
+
+from dataclasses import dataclass, field
+
+from companion.arbiter.arbiter import ArbiterParams
+from companion.checker.checker import CheckerParams
+from companion.core.gridmap import MapParams
+from companion.core.params import param
+from companion.guidance.follower import FollowerParams
+from companion.guidance.landing import LandingParams
+from companion.guidance.limits import LimitsParams
+from companion.guidance.line import LineParams
+from companion.perception.perceive import PerceptionParams
+from companion.policy.expert import ExpertParams
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleParams:
+    """The vehicle profile."""
+
+    radius_m: float = param(0.33, "SN_RADIUS", "Radius of the vehicle's disc, rotors included", "m", 0.05, 2.0)
+    corridor_m: float = param(0.10, "SN_CORRIDOR", "Margin of the corridor that the speed clamp looks along", "m", 0, 1)
+    yaw_rate_rad_s: float = param(1.2, "SN_YAW_RATE", "How fast the nose turns into the course", "rad/s", 0.0, 4.0)
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyParams:
+    """Who proposes waypoints in RL mode, and how often it is asked."""
+
+    name: str = param("geometric", "SN_POLICY", "Policy that proposes waypoints")
+    horizon_s: float = param(0.4, "SN_PO_HORIZON", "A path older than this is planned anew", "s", 0.05, 10.0)
+    retry_s: float = param(0.2, "SN_PO_RETRY", "Least time between two decisions", "s", 0.0, 5.0)
+    used_up_m: float = param(1.0, "SN_PO_USED_UP", "A path with less than this left is used up", "m", 0.1, 10.0)
+    lead_s: float = param(0.4, "SN_PO_LEAD", "A new path leaves the old one this far ahead", "s", 0.0, 2.0)
+    rejoin_m: float = param(0.4, "SN_PO_REJOIN", "Farther off the old path than this, plan from the vehicle", "m", 0, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """All of it."""
+
+    vehicle: VehicleParams = field(default_factory=VehicleParams)
+    perception: PerceptionParams = field(default_factory=PerceptionParams)
+    map: MapParams = field(default_factory=MapParams)
+    arbiter: ArbiterParams = field(default_factory=ArbiterParams)
+    policy: PolicyParams = field(default_factory=PolicyParams)
+    expert: ExpertParams = field(default_factory=ExpertParams)
+    checker: CheckerParams = field(default_factory=CheckerParams)
+    line: LineParams = field(default_factory=LineParams)
+    follower: FollowerParams = field(default_factory=FollowerParams)
+    limits: LimitsParams = field(default_factory=LimitsParams)
+    landing: LandingParams = field(default_factory=LandingParams)

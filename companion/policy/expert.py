@@ -1,0 +1,231 @@
+"""Which way does geometry lead? The expert: shortest path on the remembered map, cut to five waypoints; pure.
+
+Teacher, fallback and the bar to beat. It remembers its last path and keeps it until a new one is clearly cheaper, so
+that two ways round an obstacle do not take turns. Unknown cells and far hits cost extra but do not block: a sector
+minimum seen from far away closes gaps that are open.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from companion.core.geometry import resample
+from companion.core.gridmap import NEVER, GridMap, MapParams, centres, occupied
+from companion.core.params import param
+from companion.core.types import F64
+from companion.policy.grid_path import BLOCKED, clearance_field, reach_from, walk_back
+from companion.policy.interface import WAYPOINTS, Proposal, Query
+
+
+@dataclass(frozen=True, slots=True)
+class ExpertParams:
+    """What the geometric expert prefers."""
+
+    margin_m: float = param(0.22, "SN_EX_MARGIN", "Clearance beyond the radius that a path should keep", "m", 0.0, 1.0)
+    tight_m: float = param(0.10, "SN_EX_TIGHT", "The same where there is no other way", "m", 0.0, 1.0)
+    comfort_m: float = param(1.3, "SN_EX_COMFORT", "Clearance beyond which a path costs only its length", "m", 0.1, 5.0)
+    comfort_cost: float = param(4.0, "SN_EX_COMF_W", "Extra cost at the least clearance", "", 0.0, 50.0)
+    unknown_cost: float = param(0.6, "SN_EX_UNKNOWN", "Extra cost of a cell never seen", "", 0.0, 50.0)
+    hard_range_m: float = param(6.0, "SN_EX_HARD", "Hits beyond this cost, but do not block", "m", 0.5, 40.0)
+    far_cost: float = param(12.0, "SN_EX_FAR", "Extra cost of a far blocked cell", "", 0.0, 200.0)
+    keep_ratio: float = param(1.12, "SN_EX_KEEP", "The old path stays until a new one is this much cheaper", "", 1, 3)
+    length_m: float = param(8.0, "SN_EX_LENGTH", "Length of the five waypoints at most", "m", 1.0, 20.0)
+    chord_m: float = param(0.06, "SN_EX_CHORD", "How far a chord may leave the path", "m", 0.01, 0.5)
+    sweeps: int = param(25, "SN_EX_SWEEPS", "Elastic-band sweeps that smooth the path", "", 0, 200)
+
+
+BORDER_CELLS = 2  # paths to a goal outside the map end in this rim
+SHORTEST_USEFUL_M = 3.0  # five waypoints should reach at least this far, else the chords are relaxed
+CHORD_RELAX = (1.0, 2.0, 4.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Field:
+    """The map as the planner sees it."""
+
+    cost: F64  # (n, n)
+    clearance_m: F64  # (n, n)
+    hard_m: float
+
+
+class GeometricExpert:
+    """Policy 'geometric'. Memory: the full path last planned, (k, 2) north and east."""
+
+    name = "geometric"
+
+    def __init__(self, params: ExpertParams, map_params: MapParams) -> None:
+        self._params = params
+        self._map = map_params
+
+    def propose(self, query: Query, memory: F64 | None) -> tuple[Proposal | None, F64 | None]:
+        """Five waypoints along the cheapest path; see ``Policy.propose``."""
+        hits = occupied(query.grid, query.state.t_s, self._map)
+        clearance = clearance_field(query.grid, hits)
+        for margin in (self._params.margin_m, self._params.tight_m):
+            field = _field(query, clearance, query.radius_m + margin, self._params)
+            path = _plan(query, field, memory, self._params)
+            if path is not None:
+                return Proposal(_cut(_joined(query.prefix_ne_m, path), self._params)), path
+        return None, None
+
+
+def _field(query: Query, clearance_m: F64, hard_m: float, params: ExpertParams) -> _Field:
+    """Cost per cell: length, nearness to hits, the unknown, and walls near by."""
+    comfort_m = query.radius_m + params.comfort_m
+    lack = np.clip((comfort_m - clearance_m) / (comfort_m - query.radius_m), 0.0, 1.0)
+    cost = 1.0 + params.comfort_cost * lack * lack
+    grid = query.grid
+    cost += params.unknown_cost * ((grid.free_t <= NEVER) & (grid.hit_t <= NEVER))
+    north, east = centres(grid)
+    dn, de = north - query.state.pos_ned_m[0], east - query.state.pos_ned_m[1]
+    square = (dn * dn)[:, None] + (de * de)[None, :]
+    tight = clearance_m < hard_m
+    near = square < params.hard_range_m**2
+    cost += params.far_cost * (tight & ~near)
+    blocked = tight & near
+    here_m = _at(grid, clearance_m, query.state.pos_ned_m[:2])
+    if here_m < hard_m:  # already too near: may leave through cells no nearer than here
+        blocked &= (clearance_m < here_m - grid.cell_m / 2) | (square > 1.0)
+        cost += params.far_cost * (tight & near)
+    cost[blocked] = BLOCKED
+    return _Field(cost, clearance_m, hard_m)
+
+
+def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) -> F64 | None:
+    """The path to fly on, (k, 2) from the anchor; the old one unless the new one is clearly cheaper."""
+    grid = query.grid
+    n = field.cost.shape[0]
+    source = _cell(grid, query.prefix_ne_m[-1])
+    if field.cost.ravel()[source] >= BLOCKED:
+        source = _nearest_open(grid, field, query.prefix_ne_m[-1])
+    reach = reach_from(field.cost, source)
+    target, total = _target(query, field, reach.cost, n)
+    if target is None:
+        return None
+    kept = _kept(query, field, old)
+    if kept is not None and _path_cost(kept, query, field) <= params.keep_ratio * total * grid.cell_m:
+        return kept
+    cells = np.array(walk_back(reach, target))
+    north, east = centres(grid)
+    path = np.stack([north[cells // n], east[cells % n]], axis=1)
+    path[0] = query.prefix_ne_m[-1]
+    if np.hypot(*(path[-1] - query.goal_ne_m)) < 1.5 * grid.cell_m:
+        path[-1] = query.goal_ne_m
+    return _smooth(path, grid, field, params.sweeps)
+
+
+def _target(query: Query, field: _Field, cost: F64, n: int) -> tuple[int | None, float]:
+    """Cheapest cell to leave the map through, or the goal's own; with the cost all the way to the goal in cells."""
+    grid = query.grid
+    north, east = centres(grid)
+    to_goal = np.hypot((north - query.goal_ne_m[0])[:, None], (east - query.goal_ne_m[1])[None, :]).ravel()
+    inside = to_goal.min() < grid.cell_m
+    penalty = 4.0 if inside else 1.0  # a goal that cannot be reached yet is approached as near as possible
+    total = cost + penalty * to_goal / grid.cell_m
+    if not inside:
+        rim = np.ones((n, n), bool)
+        rim[BORDER_CELLS:-BORDER_CELLS, BORDER_CELLS:-BORDER_CELLS] = False
+        total = np.where(rim.ravel(), total, np.inf)
+    best = int(np.argmin(total))
+    return (best, float(total[best])) if math.isfinite(total[best]) else (None, math.inf)
+
+
+def _kept(query: Query, field: _Field, old: F64 | None) -> F64 | None:
+    """What is left of the old path from the anchor on, if it is still open."""
+    if old is None or len(old) < 2:
+        return None
+    offset = old - query.prefix_ne_m[-1]
+    nearest = int(np.argmin(np.einsum("ij,ij->i", offset, offset)))
+    if np.hypot(*offset[nearest]) > 2 * query.grid.cell_m or nearest >= len(old) - 2:
+        return None
+    rest = np.concatenate([query.prefix_ne_m[-1][None], old[nearest + 1 :]])
+    costs = _sample(query.grid, field.cost, rest)
+    return None if (costs >= BLOCKED).any() else rest
+
+
+def _path_cost(path: F64, query: Query, field: _Field) -> float:
+    """Cost of a path plus the straight rest to the goal, in metres."""
+    step = np.hypot(*(np.diff(path, axis=0).T))
+    cost = _sample(query.grid, field.cost, (path[1:] + path[:-1]) / 2)
+    rest = float(np.hypot(*(path[-1] - query.goal_ne_m)))
+    return float(step @ np.minimum(cost, BLOCKED)) + rest
+
+
+def _smooth(path: F64, grid: GridMap, field: _Field, sweeps: int) -> F64:
+    """Elastic band: pull every point to the middle of its neighbours while its clearance allows it."""
+    path = path.copy()
+    floor = np.minimum(_sample(grid, field.clearance_m, path), field.hard_m + 2 * grid.cell_m) - grid.cell_m / 4
+    for _ in range(sweeps if len(path) > 2 else 0):
+        moved = path.copy()
+        moved[1:-1] = 0.5 * path[1:-1] + 0.25 * (path[2:] + path[:-2])
+        fine = _sample(grid, field.clearance_m, moved) >= floor
+        fine[0] = fine[-1] = True
+        path = np.where(fine[:, None], moved, path)
+    return path
+
+
+def _joined(prefix: F64, path: F64) -> F64:
+    """Committed stretch and new path as one, in steps short enough for chords to follow."""
+    return np.concatenate([resample(prefix, 0.2)[:-1], path]) if len(prefix) > 1 else path
+
+
+def _cut(path: F64, params: ExpertParams) -> F64:
+    """At most five waypoints (k, 2) whose chords stay near the path."""
+    for relax in CHORD_RELAX:
+        waypoints = _chords(path, params.chord_m * relax, params.length_m)
+        length = float(np.hypot(*np.diff(np.concatenate([path[:1], waypoints]), axis=0).T).sum())
+        if length >= SHORTEST_USEFUL_M or len(waypoints) < WAYPOINTS:
+            break
+    return waypoints
+
+
+def _chords(path: F64, tolerance_m: float, length_m: float) -> F64:
+    """Greedy: each chord as long as the path between its ends stays within the tolerance."""
+    picked: list[int] = []
+    at, used = 0, 0.0
+    while at < len(path) - 1 and len(picked) < WAYPOINTS and used < length_m:
+        end = at + 1
+        while end + 1 < len(path) and end - at < 20 and _leave_m(path, at, end + 1) <= tolerance_m:
+            end += 1
+        used += float(np.hypot(*(path[end] - path[at])))
+        picked.append(end)
+        at = end
+    return path[picked]
+
+
+def _leave_m(path: F64, start: int, end: int) -> float:
+    """How far the path between two of its points leaves their chord."""
+    chord = path[end] - path[start]
+    length = math.hypot(chord[0], chord[1])
+    if length < 1e-9:
+        return math.inf
+    between = path[start + 1 : end] - path[start]
+    return float(np.abs(between[:, 0] * chord[1] - between[:, 1] * chord[0]).max() / length)
+
+
+def _cell(grid: GridMap, point_ne_m: F64) -> int:
+    n = grid.free_t.shape[0]
+    i = math.floor(point_ne_m[0] / grid.cell_m) - grid.corner[0]
+    j = math.floor(point_ne_m[1] / grid.cell_m) - grid.corner[1]
+    return int(min(max(i, 0), n - 1) * n + min(max(j, 0), n - 1))
+
+
+def _at(grid: GridMap, values: F64, point_ne_m: F64) -> float:
+    return float(values.ravel()[_cell(grid, point_ne_m)])
+
+
+def _sample(grid: GridMap, values: F64, points_ne_m: F64) -> F64:
+    n = values.shape[0]
+    cells = np.floor(points_ne_m / grid.cell_m).astype(np.intp) - np.array(grid.corner)
+    np.clip(cells, 0, n - 1, out=cells)
+    sampled: F64 = values[cells[:, 0], cells[:, 1]]
+    return sampled
+
+
+def _nearest_open(grid: GridMap, field: _Field, point_ne_m: F64) -> int:
+    """The open cell nearest to a point that lies in a blocked one."""
+    north, east = centres(grid)
+    square = ((north - point_ne_m[0]) ** 2)[:, None] + ((east - point_ne_m[1]) ** 2)[None, :]
+    square = np.where(field.cost >= BLOCKED, np.inf, square)
+    return int(np.argmin(square))

@@ -1,0 +1,38 @@
+"""What is a policy asked, and what does it answer? Values; the same for the learned policy and the geometric expert."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from companion.core.gridmap import GridMap
+from companion.core.types import F64, VehicleState
+
+WAYPOINTS = 5  # eq. action_mat
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """Everything a policy may look at when RL mode asks for a path."""
+
+    state: VehicleState
+    goal_ne_m: F64  # (2,)
+    grid: GridMap
+    radius_m: float  # of the vehicle
+    prefix_ne_m: F64  # (k, 2) already committed: ends where the new path has to begin, k = 1 is the vehicle's place
+    observation: F64  # (72,)
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """Five waypoints in local NED, (5, 2); fewer only where the goal is nearer."""
+
+    waypoints_ne_m: F64
+
+
+class Policy(Protocol):
+    """A pure function with a name; ``memory`` is whatever it handed back last (None at first)."""
+
+    name: str
+
+    def propose(self, query: Query, memory: F64 | None) -> tuple[Proposal | None, F64 | None]:
+        """Five waypoints, or None when there is no way; and the memory for the next call."""
+        ...
