@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from pymavlink.dialects.v20 import common as mav
 
+from companion.core.sectors import SECTORS, bin_scan
 from companion.core.types import F64, AutopilotStatus, LandedState, Scan, Setpoint, VehicleState
 
 Message = Any  # pymavlink is untyped: a MAVLink_*_message object
@@ -23,7 +24,6 @@ COMPANION_COMPONENT: Final = mav.MAV_COMP_ID_ONBOARD_COMPUTER
 PX4_MAIN_OFFBOARD: Final = 6  # PX4_CUSTOM_MAIN_MODE_OFFBOARD
 PX4_OFFBOARD: Final = PX4_MAIN_OFFBOARD << 16  # custom_mode of HEARTBEAT
 
-SECTORS: Final = 72  # length of OBSTACLE_DISTANCE.distances
 UNKNOWN_CM: Final = 65535  # "unknown / not used"
 RANGE_MAX_CM: Final = 65533  # leaves max + 1 = "no obstacle" below UNKNOWN_CM
 
@@ -31,7 +31,7 @@ RANGE_MAX_CM: Final = 65533  # leaves max + 1 = "no obstacle" below UNKNOWN_CM
 MASK_POS: Final = (1, 2, 4)
 MASK_VEL: Final = (8, 16, 32)
 MASK_ACC: Final = (64, 128, 256)
-MASK_FORCE: Final = 512
+MASK_FORCE: Final = 512  # read the acceleration fields as a force
 MASK_YAW: Final = 1024
 MASK_YAW_RATE: Final = 2048
 
@@ -219,30 +219,6 @@ def quantise_scan(scan: Scan) -> Scan:
         range_min_m=round(scan.range_min_m * 1e2) / 1e2,
         range_max_m=max_cm / 1e2,
     )
-
-
-def bin_scan(scan: Scan, sectors: int = SECTORS) -> Scan:
-    """At most ``sectors`` sectors: each new one reports the nearest hit of the rays that it overlaps.
-
-    A ray that straddles a border counts for both sides. A sector without a hit is free when at least half of its rays
-    measured nothing, else unknown.
-    """
-    count = len(scan.range_m)
-    if count <= sectors:
-        return scan
-    ratio = count / sectors
-    nearest = np.empty(sectors)
-    for i in range(sectors):
-        rays = scan.range_m[math.floor(i * ratio + 1e-9) : math.ceil((i + 1) * ratio - 1e-9)]
-        unknown = np.isnan(rays)
-        if unknown.all():
-            nearest[i] = math.nan
-            continue
-        nearest[i] = np.nanmin(rays)
-        if math.isinf(nearest[i]) and 2 * unknown.sum() > len(rays):
-            nearest[i] = math.nan
-    first_centre_rad = scan.angle_offset_rad + (ratio - 1) / 2 * scan.increment_rad
-    return Scan(scan.t_s, nearest, first_centre_rad, scan.increment_rad * ratio, scan.range_min_m, scan.range_max_m)
 
 
 def _max_cm(scan: Scan) -> int:

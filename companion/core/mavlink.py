@@ -16,6 +16,7 @@ from companion.core.transport import Transport, wait_readable
 Message = Any  # a MAVLink_*_message object; pymavlink's classes share no useful static type
 
 BUFFER_MAX_BYTES = 1 << 16  # a stream without a single packet in this much is thrown away
+SEQUENCES = 256  # packet sequence numbers wrap here
 
 
 @dataclass(slots=True)
@@ -118,7 +119,7 @@ class Connection:
         chunk = b""
         for message in messages:
             packet = message.pack(self._mavlink)
-            self._mavlink.seq = (self._mavlink.seq + 1) % 256
+            self._mavlink.seq = (self._mavlink.seq + 1) % SEQUENCES
             if self._tlog is not None:
                 self._tlog.write(self._clock.wall_us(), packet)
             chunk += packet
@@ -144,7 +145,7 @@ class Connection:
         sender = (message.get_srcSystem(), message.get_srcComponent())
         sequence = message.get_seq()
         expected = self._sequence.get(sender)
-        self._sequence[sender] = (sequence + 1) % 256
+        self._sequence[sender] = (sequence + 1) % SEQUENCES
         if expected is not None:
-            gap = (sequence - expected) % 256
-            self.counts.lost += gap if gap < 128 else 0  # a larger gap is a packet that came late or twice
+            gap = (sequence - expected) % SEQUENCES
+            self.counts.lost += gap if gap < SEQUENCES // 2 else 0  # a larger gap: a packet that came late or twice
