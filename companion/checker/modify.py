@@ -6,6 +6,7 @@ cost = length + squared shift + squared difference of neighbouring shifts. Of tw
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,16 @@ SHIFT_COST = 1.0  # metres of length per squared metre of shift
 SLACK_M = 1e-4  # kept beyond the requirement, so that rounding cannot spoil the final test
 
 
+class _Layer(NamedTuple):
+    """The possible places of one waypoint, and every piece that leads there from those of the one before."""
+
+    places: F64  # (b, 2)
+    shifts_m: F64  # (b,) to the right
+    point_index: NDArray[np.intp]  # (n,) the points that matter
+    distance_m: F64  # (a, b, n) of those points to each piece
+    lengths_m: F64  # (a, b)
+
+
 class Corrector:
     """The displaced versions of one proposal, prepared once and asked at every margin level."""
 
@@ -27,14 +38,20 @@ class Corrector:
         self._path = path_ned_m
         self._radius_m = params.radius_m
         self._points = points_ned_m
-        widest = self.required(params.margins_m()[0])
-        self._widest = self._offending(widest)
-        self._shifts_m = [SHARES * params.shift_max_m if moves else SHARES[:1] * 0.0 for moves in self._widest]
+        widest, least = params.margins_m()[0], params.margins_m()[-1]
+        self._layers: list[_Layer] = []
         normals = _normals(path_ned_m)
-        places = [path_ned_m[i + 1] + self._shifts_m[i][:, None] * normals[i] for i in range(len(normals))]
-        self._places = [path_ned_m[:1], *places]
-        reach = params.radius_m + params.margins_m()[0]
-        self._layers = [_layer(a, b, points_ned_m, reach) for a, b in zip(self._places, places, strict=False)]
+        offending = self._offending(self.required(widest))
+        required = self.required(least)
+        starts = path_ned_m[:1]
+        for i, moves in enumerate(offending):
+            shifts = SHARES * params.shift_max_m if moves else np.zeros(1)
+            places = path_ned_m[i + 1] + shifts[:, None] * normals[i]
+            layer = _layer(starts, places, shifts, points_ned_m, params.radius_m + widest)
+            self._layers.append(_reachable(layer, required))
+            starts = self._layers[-1].places
+            if len(starts) == 0:
+                return
 
     def required(self, margin_m: float) -> F64:
         """Distance (n,) to keep from each point at a margin level."""
@@ -42,50 +59,57 @@ class Corrector:
 
     def correct(self, margin_m: float) -> F64 | None:
         """The cheapest correction (k + 1, 2) that passes at the margin; None if there is none."""
+        if len(self._layers[-1].shifts_m) == 0:
+            return None
         required = self.required(margin_m)
-        moves = self._offending(required)
-        cost: F64 = np.zeros(1)
-        shifts: F64 = np.zeros(1)
+        cost, shifts_m = np.zeros(1), np.zeros(1)
         origins: list[NDArray[np.intp]] = []
-        for i, layer in enumerate(self._layers):
-            index, distance, lengths = layer
-            steps = lengths + SHIFT_COST * (self._shifts_m[i] - shifts[:, None]) ** 2
-            if len(index):
-                blocked = (distance < required[index] + SLACK_M).any(axis=2)
-                steps = np.where(blocked, math.inf, steps)
-            if not moves[i]:
-                steps[:, 1:] = math.inf
+        for layer, moves in zip(self._layers, self._offending(required), strict=True):
+            steps = layer.lengths_m + SHIFT_COST * (layer.shifts_m - shifts_m[:, None]) ** 2
+            steps[_blocked(layer, required)] = math.inf
+            if not moves:
+                steps[:, layer.shifts_m != 0.0] = math.inf
             total = cost[:, None] + steps
             origins.append(total.argmin(axis=0))
-            cost = total.min(axis=0) + SHIFT_COST * self._shifts_m[i] ** 2
-            shifts = self._shifts_m[i]
+            cost = total.min(axis=0) + SHIFT_COST * layer.shifts_m**2
+            shifts_m = layer.shifts_m
         return self._trace(cost, origins) if np.isfinite(cost).any() else None
 
     def _trace(self, cost: F64, origins: list[NDArray[np.intp]]) -> F64:
         choice = int(cost.argmin())
         chosen = []
-        for places, origin in zip(reversed(self._places[1:]), reversed(origins), strict=True):
-            chosen.append(places[choice])
+        for layer, origin in zip(reversed(self._layers), reversed(origins), strict=True):
+            chosen.append(layer.places[choice])
             choice = int(origin[choice])
         return np.array([self._path[0], *reversed(chosen)])
 
     def _offending(self, required_m: F64) -> list[bool]:
         """Which waypoints end or begin a piece that comes too near to a point."""
         pieces = [self._path[i : i + 2] for i in range(len(self._path) - 1)]
-        bad = [self._too_near(piece, required_m) for piece in pieces]
+        bad = [bool((geometry.points_to_polyline_distance(p, self._points) < required_m).any()) for p in pieces]
         return [here or following for here, following in zip(bad, [*bad[1:], False], strict=True)]
 
-    def _too_near(self, piece: F64, required_m: F64) -> bool:
-        if len(self._points) == 0:
-            return False
-        return bool((geometry.points_to_polyline_distance(piece, self._points) < required_m).any())
+
+def _blocked(layer: _Layer, required_m: F64) -> NDArray[np.bool_]:
+    """Which pieces (a, b) come too near to a point."""
+    too_near: NDArray[np.bool_] = layer.distance_m < required_m[layer.point_index] + SLACK_M
+    return np.asarray(too_near.any(axis=2))
 
 
-def _layer(starts: F64, ends: F64, points_ned_m: F64, reach_m: float) -> tuple[NDArray[np.intp], F64, F64]:
-    """Pieces from every start (a, 2) to every end (b, 2).
+def _reachable(layer: _Layer, required_m: F64) -> _Layer:
+    """The layer without the places that no free piece leads to."""
+    reached = ~_blocked(layer, required_m).all(axis=0)
+    return _Layer(
+        layer.places[reached],
+        layer.shifts_m[reached],
+        layer.point_index,
+        layer.distance_m[:, reached],
+        layer.lengths_m[:, reached],
+    )
 
-    Indices (n,) of the points that matter, their distances (a, b, n) to each piece, lengths (a, b).
-    """
+
+def _layer(starts: F64, ends: F64, shifts_m: F64, points_ned_m: F64, reach_m: float) -> _Layer:
+    """Pieces from every start (a, 2) to every end (b, 2)."""
     both = np.concatenate((starts, ends))
     low, high = both.min(axis=0) - reach_m, both.max(axis=0) + reach_m
     index = np.flatnonzero(((points_ned_m >= low) & (points_ned_m <= high)).all(axis=1))
@@ -104,7 +128,7 @@ def _layer(starts: F64, ends: F64, points_ned_m: F64, reach_m: float) -> tuple[N
     off_n *= off_n
     off_e *= off_e
     off_n += off_e
-    return index, np.sqrt(off_n, out=off_n), np.sqrt(squared)
+    return _Layer(ends, shifts_m, index, np.sqrt(off_n, out=off_n), np.sqrt(squared))
 
 
 def _normals(path_ned_m: F64) -> F64:

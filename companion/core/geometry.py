@@ -8,7 +8,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.core.types import F64
 
@@ -189,22 +188,6 @@ def swept_free_length(
     if len(near) == 0:
         return whole
     return min(whole, _first_contact(pieces, near, required_distance(ahead[0], near, radius_m)))
-
-
-def path_clear(path_ned_m: F64, points_ned_m: F64, radius_m: float, floor_m: float = 0.0) -> bool:
-    """Can a disc follow the whole polyline without touching? As ``swept_free_length``, with a floor."""
-    near = points_near(path_ned_m, points_ned_m, radius_m)
-    if len(near) == 0:
-        return True
-    required = required_distance(path_ned_m[0], near, radius_m, floor_m)
-    return bool((points_to_polyline_distance(path_ned_m, near) >= required).all())
-
-
-def mask_within(points_ned_m: F64, centre_ned_m: F64, radius_m: float) -> NDArray[np.bool_]:
-    """Which points (n,) lie within radius_m of a place."""
-    dn, de = points_ned_m[:, 0] - centre_ned_m[0], points_ned_m[:, 1] - centre_ned_m[1]
-    within: NDArray[np.bool_] = dn * dn + de * de <= radius_m * radius_m
-    return within
 
 
 def _first_contact(pieces: list[Segment], points_ned_m: F64, required_m: F64) -> float:
