@@ -1,0 +1,293 @@
+"""What does the autopilot do with commands, setpoints and time? PX4's commander, without sockets and without physics.
+
+Feed ``update`` with the vehicle's state at every control tick, call a ``command_*`` when one arrives, and read
+``armed``, ``mode``, ``landed_state`` and ``demand``. What PX4 would say as STATUSTEXT gathers in ``texts``.
+Local ned: the origin is home, where the vehicle booted.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+from pymavlink.dialects.v20 import common as mav
+
+from companion.core.types import LandedState, VehicleState
+from sitl.demand import IDLE, Demand, TrajectorySetpoint
+from sitl.failsafe import Failsafe, offboard_loss
+from sitl.land_detector import LandDetector
+from sitl.modes import ARMABLE, FLYABLE, TITLES, FlightMode
+from sitl.px4_params import ParamStore
+from sitl.steering import Behaviour, Steering, asks_to_climb
+
+READY_S: Final = 2.5  # PX4 v1.16 SIH: prearm checks pass two to three seconds after boot
+
+CRITICAL: Final = mav.MAV_SEVERITY_CRITICAL
+INFO: Final = mav.MAV_SEVERITY_INFO
+
+_BEHAVIOUR: Final = {
+    FlightMode.HOLD: Behaviour.HOLD,
+    FlightMode.TAKEOFF: Behaviour.TAKEOFF,
+    FlightMode.LAND: Behaviour.LAND,
+    FlightMode.RTL: Behaviour.RETURN,
+    FlightMode.OFFBOARD: Behaviour.OFFBOARD,
+}
+
+
+class Result(IntEnum):
+    """MAV_RESULT."""
+
+    ACCEPTED = mav.MAV_RESULT_ACCEPTED
+    TEMPORARILY_REJECTED = mav.MAV_RESULT_TEMPORARILY_REJECTED
+    DENIED = mav.MAV_RESULT_DENIED
+    UNSUPPORTED = mav.MAV_RESULT_UNSUPPORTED
+    FAILED = mav.MAV_RESULT_FAILED
+
+
+@dataclass(frozen=True, slots=True)
+class StatusText:
+    """One STATUSTEXT to be."""
+
+    severity: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class CommandResult:
+    """The answer to a command and the reason, empty when there is nothing to say."""
+
+    result: Result
+    text: str = ""
+
+    @property
+    def accepted(self) -> bool:
+        """Was the command carried out?"""
+        return self.result is Result.ACCEPTED
+
+
+ACCEPTED: Final = CommandResult(Result.ACCEPTED)
+
+
+class Autopilot:
+    """Arming, flight modes, take-off, landing, failsafe."""
+
+    def __init__(self, params: ParamStore | None = None) -> None:
+        self.params = params or ParamStore()
+        self.armed = False
+        self.user_mode = FlightMode.HOLD  # what was asked for; ``mode`` is what is flown
+        self.failsafe: Failsafe | None = None
+        self.has_flown = False
+        self.demand: Demand = IDLE
+        self.texts: list[StatusText] = []
+        self._state: VehicleState | None = None
+        self._detector = LandDetector()
+        self._steering = Steering(self.params)
+        self._ready_said = False
+        self._armed_s = math.inf
+        self._landed_s = math.inf  # since when armed and landed
+        self._heard_s = -math.inf  # when the last setpoint of any kind arrived
+        self._setpoint: TrajectorySetpoint | None = None
+
+    # --- what others see --------------------------------------------------------------------------------------
+
+    @property
+    def t_s(self) -> float:
+        """Vehicle time of the last update."""
+        return self._state.t_s if self._state is not None else 0.0
+
+    @property
+    def ready(self) -> bool:
+        """Have the prearm checks passed?"""
+        return self.t_s >= READY_S
+
+    @property
+    def mode(self) -> FlightMode:
+        """The flight mode that HEARTBEAT shows."""
+        return self.failsafe.mode if self.failsafe is not None else self.user_mode
+
+    @property
+    def landed(self) -> bool:
+        """What the land detector says."""
+        return self._detector.landed
+
+    @property
+    def landed_state(self) -> LandedState:
+        """MAV_LANDED_STATE as EXTENDED_SYS_STATE shows it."""
+        if self.landed:
+            return LandedState.ON_GROUND
+        if self.mode is FlightMode.TAKEOFF:
+            return LandedState.TAKEOFF
+        return LandedState.LANDING if self.mode is FlightMode.LAND else LandedState.IN_AIR
+
+    def offboard_available(self, t_s: float) -> bool:
+        """Is the setpoint stream fresh enough for OFFBOARD at ``t_s``?"""
+        return t_s - self._heard_s <= self.params["COM_OF_LOSS_T"]
+
+    # --- what arrives -----------------------------------------------------------------------------------------
+
+    def hear_setpoint(self, t_s: float) -> None:
+        """A setpoint arrived: proof of life of the OFFBOARD stream, in any mode."""
+        if t_s - self._heard_s > self.params["COM_OF_LOSS_T"]:
+            self._setpoint = None  # of an older stream
+        self._heard_s = max(self._heard_s, t_s)
+
+    def use_setpoint(self, setpoint: TrajectorySetpoint) -> None:
+        """From now on this is what OFFBOARD flies."""
+        self._setpoint = setpoint
+        if self._state is not None and self._steers() and self.mode is FlightMode.OFFBOARD:
+            self.demand = self._steering.demand(Behaviour.OFFBOARD, self._state, setpoint)
+
+    def command_arm(self, force: bool = False) -> CommandResult:
+        """MAV_CMD_COMPONENT_ARM_DISARM with 1."""
+        if self.armed:
+            return ACCEPTED
+        allowed = self.user_mode in ARMABLE and (
+            self.user_mode is not FlightMode.OFFBOARD or self.offboard_available(self.t_s)
+        )
+        if not force and not (self.ready and allowed):
+            return self._refuse("Arming denied: Resolve system health failures first")
+        self.armed = True
+        self._armed_s = self._landed_s = self.t_s
+        self._steering.restart()
+        self._say(INFO, "Armed by external command")
+        return ACCEPTED
+
+    def command_disarm(self, force: bool = False) -> CommandResult:
+        """MAV_CMD_COMPONENT_ARM_DISARM with 0; ``force`` stops the motors in the air."""
+        if not self.armed:
+            return ACCEPTED
+        if not (force or self.landed):
+            return self._refuse("Disarming denied: not landed")
+        self._disarm("Disarmed by external command")
+        return ACCEPTED
+
+    def command_mode(self, mode: FlightMode | None) -> CommandResult:
+        """MAV_CMD_DO_SET_MODE; None is a mode that PX4 does not have."""
+        if mode is None:
+            return CommandResult(Result.TEMPORARILY_REJECTED, "Unsupported mode")
+        if self.armed and not self._flyable(mode):
+            return self._refuse(f"Switching to {TITLES[mode]} is currently not available")
+        self._change_mode(mode)
+        return ACCEPTED
+
+    def command_takeoff(self, down_m: float | None = None) -> CommandResult:
+        """MAV_CMD_NAV_TAKEOFF to a local altitude; None: MIS_TAKEOFF_ALT above here."""
+        here_m = float(self._state.pos_ned_m[2]) if self._state is not None else 0.0
+        if down_m is None:
+            height_m = float(self.params["MIS_TAKEOFF_ALT"])
+            self._say(INFO, f"Using default takeoff altitude: {height_m:.1f} m")
+            down_m = here_m - height_m
+        elif down_m > here_m:
+            self._say(CRITICAL, "Already higher than takeoff altitude")
+        self._change_mode(FlightMode.TAKEOFF)
+        self._steering.restart()
+        self._steering.takeoff_down_m = down_m
+        return ACCEPTED
+
+    def command_land(self) -> CommandResult:
+        """MAV_CMD_NAV_LAND: here."""
+        self._change_mode(FlightMode.LAND)
+        return ACCEPTED
+
+    # --- time passes ------------------------------------------------------------------------------------------
+
+    def update(self, state: VehicleState, contact: bool) -> None:
+        """One control tick; ``contact``: any part touches the ground."""
+        self._state = state
+        if not self._ready_said and self.ready:
+            self._ready_said = True
+            self._say(INFO, "Ready for takeoff!")
+        self._detect_ground(contact)
+        if not self.armed:
+            self.demand = IDLE
+            return
+        self._watch_stream()
+        self._watch_disarm()
+        if not self._steers():
+            self.demand = IDLE
+            return
+        self.demand = self._steering.demand(self._behaviour(), state, self._setpoint)
+        if self.mode is FlightMode.TAKEOFF and self._steering.arrived(state):
+            self.user_mode = FlightMode.HOLD
+            self._steering.settle()
+
+    def _detect_ground(self, contact: bool) -> None:
+        assert self._state is not None
+        if not self._detector.update(self._state, contact, self._wants_up()):
+            return
+        if self.landed:
+            self._landed_s = self._state.t_s
+            self._steering.restart()
+            self._say(INFO, "Landing detected")
+        else:
+            self.has_flown = True
+            self._say(INFO, "Takeoff detected")
+
+    def _watch_stream(self) -> None:
+        """Enter or leave the failsafe; the intended mode comes back by itself when the stream resumes."""
+        lost = self.user_mode is FlightMode.OFFBOARD and not self.offboard_available(self.t_s)
+        if lost and self.failsafe is None:
+            self.failsafe = offboard_loss(int(self.params["COM_OBL_RC_ACT"]))
+            self._steering.restart()
+            self._say(CRITICAL, "Failsafe activated")
+            if self.failsafe.behaviour is Behaviour.CUT:
+                self._disarm("Disarmed by failsafe")
+        elif not lost and self.failsafe is not None:
+            self.failsafe = None
+            self._steering.restart()
+
+    def _watch_disarm(self) -> None:
+        if not (self.armed and self.landed):
+            return
+        flown = self._landed_s > self._armed_s
+        limit_s = self.params["COM_DISARM_LAND" if flown else "COM_DISARM_PRFLT"]
+        if limit_s > 0.0 and not self._wants_up() and self.t_s - self._landed_s >= limit_s:
+            self._disarm("Disarmed by landing" if flown else "Disarmed by auto preflight disarming")
+
+    def _steers(self) -> bool:
+        """Do the loops act? Not while disarmed, spooling up, or on the ground without a wish to leave it."""
+        if not self.armed:
+            return False
+        if not self.landed:
+            return True
+        return self._wants_up() and self.t_s - self._armed_s >= self.params["COM_SPOOLUP_TIME"]
+
+    def _wants_up(self) -> bool:
+        if not self.armed or self._state is None:
+            return False
+        behaviour = self._behaviour()
+        if behaviour is Behaviour.OFFBOARD:
+            return asks_to_climb(self._setpoint, self._state)
+        return behaviour is Behaviour.TAKEOFF
+
+    def _behaviour(self) -> Behaviour:
+        return self.failsafe.behaviour if self.failsafe is not None else _BEHAVIOUR.get(self.user_mode, Behaviour.HOLD)
+
+    def _flyable(self, mode: FlightMode) -> bool:
+        return mode in FLYABLE and (mode is not FlightMode.OFFBOARD or self.offboard_available(self.t_s))
+
+    def _change_mode(self, mode: FlightMode) -> None:
+        if mode is self.user_mode and self.failsafe is None:
+            return
+        self.user_mode = mode
+        self.failsafe = None
+        self._steering.restart()
+        if mode is FlightMode.LAND and self.armed:
+            self._say(INFO, "Landing at current position")
+        elif mode is FlightMode.RTL and self.armed:
+            self._say(INFO, "RTL: start return")
+
+    def _disarm(self, text: str) -> None:
+        self.armed = False
+        self.failsafe = None
+        self.demand = IDLE
+        if self.user_mode is not FlightMode.OFFBOARD:
+            self.user_mode = FlightMode.HOLD
+        self._say(INFO, text)
+
+    def _refuse(self, text: str) -> CommandResult:
+        self._say(CRITICAL, text)
+        return CommandResult(Result.TEMPORARILY_REJECTED, text)
+
+    def _say(self, severity: int, text: str) -> None:
+        self.texts.append(StatusText(severity, text))

@@ -1,0 +1,231 @@
+"""What happens to the vehicle between one scan and the next? Physics, autopilot, LiDAR and contact; no sockets.
+
+Vehicle time only: the same calls give the same bits, however long they take. ``advance`` stops at every scan instant
+and returns what the companion would see of it, quantised as the wire does. A setpoint takes effect a configured
+latency after the scan that it answers. Local ned: origin where the vehicle stands at the start; world ned where the
+name says so.
+"""
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from companion.core.codec import from_ms, quantise_scan, quantise_setpoint, quantise_state
+from companion.core.types import F64, AutopilotStatus, Scan, Setpoint, VehicleState
+from sitl.autopilot import Autopilot
+from sitl.collision import CollisionChecker
+from sitl.demand import Demand, Loop, TrajectorySetpoint, no_axes
+from sitl.lidar import Lidar, LidarParams
+from sitl.modes import FlightMode
+from sitl.px4_params import ParamStore
+from sitl.truth_log import TruthRow
+from sitl.vehicle import Truth, Vehicle, Wind
+from sitl.world import World
+
+STEP_MS: Final = 4  # 250 Hz physics
+CONTROL_STEPS: Final = 10  # autopilot at 25 Hz
+SPEED_SLACK_M_S: Final = 2.0  # assumed: more than the vehicle gains within one scan
+
+
+@dataclass(frozen=True, slots=True)
+class SimConfig:
+    """One run, but for the world (whose movers are already seeded)."""
+
+    seed: int = 0  # turbulence and LiDAR noise
+    spawn_ned_m: tuple[float, float] | None = None  # world north, east; None: the world's start
+    spawn_yaw_rad: float = 0.0
+    wind: Wind | None = None
+    latency_s: float = 0.05  # from scan to setpoint in force
+    radius_m: float = 0.33
+    lidar: LidarParams = field(default_factory=LidarParams)
+    px4_params: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """What the companion sees of one scan instant."""
+
+    state: VehicleState
+    status: AutopilotStatus
+    scan: Scan
+
+
+class Simulation:
+    """One vehicle in one world."""
+
+    def __init__(self, world: World, config: SimConfig | None = None) -> None:
+        self.config = config or SimConfig()
+        self.world = world
+        self.autopilot = Autopilot(ParamStore(self.config.px4_params))
+        self.rows: list[TruthRow] = []  # one a scan, until the vehicle has disarmed after its flight
+        self.contact = False  # ever
+        spawn = world.start_ned_m if self.config.spawn_ned_m is None else self.config.spawn_ned_m
+        self.spawn_ned_m: F64 = np.array([spawn[0], spawn[1], 0.0])
+        self.scan_steps = _scan_steps(self.config.lidar)
+        self.state: VehicleState  # the estimate at the last control tick, quantised
+        self.truth: Truth
+        self.scan: Scan | None = None
+        self._delay_steps = math.ceil((self.config.latency_s + self.config.lidar.latency_s) * 1e3 / STEP_MS - 1e-9)
+        self._step = 0
+        self._queue: deque[tuple[int, TrajectorySetpoint]] = deque()  # step from which it is in force
+        self._vehicle = Vehicle(STEP_MS / 1e3)
+        self._vehicle.reset(self.config.seed, self.config.spawn_yaw_rad, self.config.wind)
+        self._applied: Demand | None = None
+        self._armed = False
+        self._lidar = Lidar(world, self.config.lidar, self.config.seed)
+        self._collision = CollisionChecker(world, self.config.radius_m)
+        self._mover_m_s = max((m.speed_m_s for m in world.movers), default=0.0)
+        self._check_step = 0  # when contact has to be looked at again
+        self._clearance_m = math.inf  # smallest since the last row
+        self._sense()
+        self._check_contact()
+
+    @property
+    def t_s(self) -> float:
+        """Vehicle time since boot."""
+        return from_ms(self._step * STEP_MS)
+
+    @property
+    def t_ms(self) -> int:
+        """Vehicle time since boot, exact."""
+        return self._step * STEP_MS
+
+    @property
+    def finished(self) -> bool:
+        """Has the vehicle flown and disarmed?"""
+        return self.autopilot.has_flown and not self.autopilot.armed
+
+    def advance_to_scan(self) -> Observation:
+        """Advance to the next scan instant."""
+        while True:
+            observation = self.advance(self.scan_steps)
+            if observation is not None:
+                return observation
+
+    def advance(self, steps: int) -> Observation | None:
+        """Advance at most ``steps`` physics steps; stops early, with its observation, at a scan instant."""
+        to_scan = self.scan_steps - self._step % self.scan_steps
+        target = self._step + min(steps, to_scan)
+        while self._step < target:
+            self._advance_to(min(self._next_event(), target))
+        return self._observe() if steps >= to_scan else None
+
+    def submit(self, setpoint: Setpoint) -> None:
+        """The companion's answer to a scan; in force one latency after ``setpoint.t_s``."""
+        sent = quantise_setpoint(setpoint)
+        self.submit_trajectory(_trajectory(sent), round(sent.t_s * 1e3))
+
+    def submit_trajectory(self, setpoint: TrajectorySetpoint, scan_ms: int | None) -> None:
+        """A setpoint from the wire; ``scan_ms``: time of the scan that it answers, None: in force at once."""
+        due = self._step if scan_ms is None else max(self._step, scan_ms // STEP_MS + self._delay_steps)
+        while self._queue and self._queue[-1][0] >= due:
+            self._queue.pop()  # overtaken by this one
+        self._queue.append((due, setpoint))
+        self.autopilot.hear_setpoint(self.t_s)
+
+    # --- one stretch of time ----------------------------------------------------------------------------------
+
+    def _next_event(self) -> int:
+        """The next step at which Python has something to do."""
+        event = self._step + CONTROL_STEPS - self._step % CONTROL_STEPS
+        if self._queue:
+            event = min(event, max(self._queue[0][0], self._step))
+        return min(event, max(self._check_step, self._step + 1))
+
+    def _advance_to(self, step: int) -> None:
+        if step > self._step:
+            self._apply()
+            self._vehicle.step(step - self._step)
+            self._step = step
+        while self._queue and self._queue[0][0] <= self._step:
+            self.autopilot.use_setpoint(self._queue.popleft()[1])
+        control = self._step % CONTROL_STEPS == 0
+        checked = self._step >= self._check_step
+        if control or checked:
+            self._sense()
+        if control:
+            self.autopilot.update(self.state, self.truth.on_ground)
+        if checked:
+            self._check_contact()
+
+    def _sense(self) -> None:
+        truth = self.truth = self._vehicle.truth()
+        self.state = quantise_state(
+            VehicleState(self.t_s, truth.pos_ned_m, truth.vel_ned_m_s, truth.q_ned_frd, truth.rates_frd_rad_s)
+        )
+
+    def _check_contact(self) -> None:
+        """Look, and work out until when nothing can be touched: clearance over the highest closing speed."""
+        pos = self.truth.pos_ned_m + self.spawn_ned_m
+        clearance_m = self._collision.clearance(self.t_s, pos)
+        self._clearance_m = min(self._clearance_m, clearance_m)
+        self.contact = self.contact or not clearance_m > 0.0
+        north_m_s, east_m_s, down_m_s = self.truth.vel_ned_m_s.tolist()
+        speed_m_s = math.hypot(north_m_s, east_m_s, down_m_s) + SPEED_SLACK_M_S + self._mover_m_s
+        free_steps = min(clearance_m / speed_m_s * 1e3 / STEP_MS, self.scan_steps)
+        to_scan = self.scan_steps - self._step % self.scan_steps
+        self._check_step = self._step + (to_scan if free_steps >= to_scan else max(1, int(free_steps)))
+
+    def _observe(self) -> Observation:
+        ap = self.autopilot
+        self._check_scan_instant()
+        scan = self._lidar.scan(self.t_s, self.truth.pos_ned_m + self.spawn_ned_m, self.truth.q_ned_frd)
+        self.scan = quantise_scan(scan)
+        if not self.finished:
+            self.rows.append(
+                TruthRow(self.t_ms, self.truth, self._clearance_m, self.contact, ap.mode, ap.armed, ap.landed_state)
+            )
+        self._clearance_m = math.inf
+        status = AutopilotStatus(ap.armed, ap.mode is FlightMode.OFFBOARD, ap.landed_state)
+        return Observation(self.state, status, self.scan)
+
+    def _check_scan_instant(self) -> None:
+        """A scan instant off the control grid has neither state nor clearance yet."""
+        if self._step % CONTROL_STEPS:
+            self._sense()
+        if self._check_step <= self._step:
+            self._check_contact()
+
+    # --- to the vehicle ---------------------------------------------------------------------------------------
+
+    def _apply(self) -> None:
+        ap = self.autopilot
+        if ap.armed is not self._armed:
+            self._armed = ap.armed
+            self._vehicle.set_motors(ap.armed)
+        demand = ap.demand
+        if demand is self._applied:
+            return
+        self._applied = demand
+        if demand.loop is Loop.IDLE:
+            self._vehicle.command_idle()
+            return
+        self._vehicle.command_position(
+            demand.pos_ned_m.tolist(),
+            demand.vel_ned_m_s.tolist(),
+            demand.acc_ned_m_s2.tolist(),
+            demand.yaw_rad,
+            demand.yaw_rate_rad_s,
+        )
+
+
+def _scan_steps(params: LidarParams) -> int:
+    """Physics steps from scan to scan. Raises ValueError when the rate does not fit the physics."""
+    steps = round(1e3 / STEP_MS / params.rate_hz)
+    if steps < 1 or not math.isclose(steps * STEP_MS / 1e3 * params.rate_hz, 1.0, rel_tol=1e-6):
+        raise ValueError(f"LiDAR: {params.rate_hz} Hz is no whole number of {STEP_MS} ms physics steps")
+    return steps
+
+
+def _trajectory(setpoint: Setpoint) -> TrajectorySetpoint:
+    return TrajectorySetpoint(
+        no_axes() if setpoint.pos_ned_m is None else setpoint.pos_ned_m,
+        no_axes() if setpoint.vel_ned_m_s is None else setpoint.vel_ned_m_s,
+        no_axes() if setpoint.acc_ned_m_s2 is None else setpoint.acc_ned_m_s2,
+        math.nan if setpoint.yaw_rad is None else setpoint.yaw_rad,
+        math.nan,
+    )

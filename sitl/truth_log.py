@@ -1,0 +1,54 @@
+"""What really happened, one line a scan? Rows, and their text: deterministic, so that equal flights give equal bytes.
+
+Positions are world ned, everything else as in ``Truth``; numbers are the shortest text that gives the same double.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from companion.core.types import F64, LandedState
+from sitl.modes import FlightMode
+from sitl.vehicle import Truth
+
+
+class TruthRow(NamedTuple):
+    """One scan instant."""
+
+    t_ms: int
+    truth: Truth  # local ned
+    clearance_m: float  # smallest since the row before; surface to surface
+    contact: bool  # ever so far
+    mode: FlightMode
+    armed: bool
+    landed: LandedState
+
+
+def truth_line(row: TruthRow, spawn_ned_m: F64) -> str:
+    """One JSON object without line end; an infinite clearance is null."""
+    truth = row.truth
+    return json.dumps(
+        {
+            "t_s": row.t_ms / 1e3,
+            "pos_world_ned_m": (truth.pos_ned_m + spawn_ned_m).tolist(),
+            "vel_ned_m_s": truth.vel_ned_m_s.tolist(),
+            "q_ned_frd": truth.q_ned_frd.tolist(),
+            "rates_frd_rad_s": truth.rates_frd_rad_s.tolist(),
+            "clearance_m": row.clearance_m if row.clearance_m != float("inf") else None,
+            "contact": row.contact,
+            "mode": row.mode.name,
+            "armed": row.armed,
+            "landed": row.landed.name,
+        },
+        allow_nan=False,
+        separators=(",", ":"),
+    )
+
+
+def truth_sha256(rows: Iterable[TruthRow], spawn_ned_m: F64) -> str:
+    """SHA-256 of the truth log as a file has it."""
+    digest = hashlib.sha256()
+    for row in rows:
+        digest.update(truth_line(row, spawn_ned_m).encode() + b"\n")
+    return digest.hexdigest()
