@@ -37,6 +37,7 @@ class CheckQuery:
     start_ned_m: F64  # (2,)
     start_vel_ned_m_s: F64  # (2,)
     goal_ned_m: F64  # (2,)
+    radius_m: float  # hull of the vehicle
     points_ned_m: F64  # (n, 2) everything remembered
     proposal_ned_m: F64  # (k, 2) waypoints
     escape_ned_m: F64 | None  # (k, 2) waypoints of a way out, tried only if the proposal cannot be saved
@@ -89,13 +90,12 @@ def check(query: CheckQuery, params: CheckerParams) -> Verdict:
     )
 
 
-def recheck(path_ned_m: F64, s_m: float, points_ned_m: F64, margin_m: float, params: CheckerParams) -> bool:
-    """Is the rest of an accepted path still free? At a share of its margin, or noise would refuse it every tick."""
+def recheck(path_ned_m: F64, s_m: float, points_ned_m: F64, radius_m: float) -> bool:
+    """Is the rest of an accepted path still free? ``radius_m`` from ``CheckerParams.recheck_radius_m``."""
     if not math.isfinite(s_m):
         return False
     rest = geometry.part(path_ned_m, s_m)
-    radius = params.radius_m + params.recheck_share * margin_m
-    return geometry.swept_free_length(rest, points_ned_m, radius) >= geometry.length(rest) - 1e-9
+    return geometry.swept_free_length(rest, points_ned_m, radius_m) >= geometry.length(rest) - 1e-9
 
 
 def _keep(query: CheckQuery, params: CheckerParams) -> _Candidate | None:
@@ -111,8 +111,9 @@ def _modify(query: CheckQuery, beyond_m: float, params: CheckerParams) -> _Candi
     path = _path(query.start_ned_m, query.proposal_ned_m)
     if path is None:
         return None
-    reach = params.shift_max_m + params.radius_m + params.margins_m()[0]
-    corrector = Corrector(path, geometry.points_near(path, query.points_ned_m, reach), params)
+    reach = params.shift_max_m + query.radius_m + params.margins_m()[0]
+    near = geometry.points_near(path, query.points_ned_m, reach)
+    corrector = Corrector(path, near, query.radius_m, params)
     for margin in params.margins_m():
         if margin <= beyond_m:
             return None
@@ -129,7 +130,7 @@ def _escape(query: CheckQuery, params: CheckerParams) -> _Candidate | None:
         return None
     whole = geometry.length(path)
     for margin in params.margins_m():
-        free = geometry.swept_free_length(path, query.points_ned_m, params.radius_m + margin)
+        free = geometry.swept_free_length(path, query.points_ned_m, query.radius_m + margin)
         cut = path if free >= whole else geometry.part(path, 0.0, free - CUT_SHORT_M)
         if geometry.length(cut) < min(params.escape_least_m, whole):
             continue
@@ -143,7 +144,7 @@ def _judge(
     kind: VerdictKind, path: F64, query: CheckQuery, margins_m: tuple[float, ...], params: CheckerParams
 ) -> _Candidate | None:
     """The collision test: the candidate at the first of the margins that it passes, None if it passes none."""
-    radius = params.radius_m
+    radius = query.radius_m
     near = geometry.points_near(path, query.points_ned_m, radius + max(params.clearance_full_m, margins_m[0]))
     distance = geometry.points_to_polyline_distance(path, near)
     clearance = min(float(distance.min()) - radius if len(near) else math.inf, params.clearance_full_m)

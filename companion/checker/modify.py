@@ -33,10 +33,10 @@ class _Layer(NamedTuple):
 class Corrector:
     """The displaced versions of one proposal, prepared once and asked at every margin level."""
 
-    def __init__(self, path_ned_m: F64, points_ned_m: F64, params: CheckerParams) -> None:
+    def __init__(self, path_ned_m: F64, points_ned_m: F64, radius_m: float, params: CheckerParams) -> None:
         """``path_ned_m`` (k + 1, 2) with the start first; offending pieces are judged at the widest margin."""
         self._path = path_ned_m
-        self._radius_m = params.radius_m
+        self._radius_m = radius_m
         self._points = points_ned_m
         widest, least = params.margins_m()[0], params.margins_m()[-1]
         self._layers: list[_Layer] = []
@@ -47,7 +47,7 @@ class Corrector:
         for i, moves in enumerate(offending):
             shifts = SHARES * params.shift_max_m if moves else np.zeros(1)
             places = path_ned_m[i + 1] + shifts[:, None] * normals[i]
-            layer = _layer(starts, places, shifts, points_ned_m, params.radius_m + widest)
+            layer = _layer(starts, places, shifts, points_ned_m, radius_m + widest)
             self._layers.append(_reachable(layer, required))
             starts = self._layers[-1].places
             if len(starts) == 0:

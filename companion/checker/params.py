@@ -9,7 +9,6 @@ from companion.core.params import param
 class CheckerParams:
     """Margins, bounds of the correction, weights of the score."""
 
-    radius_m: float = param(0.33, "CHK_RADIUS", "hull of the vehicle", "m", 0.05, 2.0)
     margin_full_m: float = param(0.20, "CHK_MARGIN_FULL", "margin asked for first", "m", 0.0, 2.0)
     margin_reduced_m: float = param(
         0.10, "CHK_MARGIN_RED", "margin in force if nothing passes the first", "m", 0.0, 2.0
@@ -31,3 +30,7 @@ class CheckerParams:
         """The declared margin levels, widest first."""
         levels = {self.margin_full_m, self.margin_reduced_m, self.margin_least_m}
         return tuple(sorted(levels, reverse=True))
+
+    def recheck_radius_m(self, radius_m: float, margin_m: float) -> float:
+        """Radius at which an accepted path must stay free in flight: less than accepted, or noise would refuse it."""
+        return radius_m + self.recheck_share * margin_m
