@@ -63,10 +63,7 @@ def follow(path_ned_m: F64, state: VehicleState, s_min_m: float, target: Target,
     pieces = geometry.segments(path_ned_m)
     speed = target.speed_m_s * _share_off_path(at.distance_m, params)
     if target.course_rad is None:
-        if target.course_rad is None:
         vel_n, vel_e = _velocity(pieces, at.s_m + speed * params.lead_s, speed, params)
-    else:
-        vel_n, vel_e = speed * math.cos(target.course_rad), speed * math.sin(target.course_rad)
     else:
         vel_n, vel_e = speed * math.cos(target.course_rad), speed * math.sin(target.course_rad)
     place_n, place_e = _place(pieces, at.s_m + speed * params.delay_s, path_ned_m)
