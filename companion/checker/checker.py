@@ -39,7 +39,7 @@ class CheckQuery:
     goal_ned_m: F64  # (2,)
     radius_m: float  # hull of the vehicle
     points_ned_m: F64  # (n, 2) everything remembered
-    proposal_ned_m: F64  # (k, 2) waypoints
+    proposal_ned_m: F64 | None  # (k, 2) waypoints; None: the policy has none
     escape_ned_m: F64 | None  # (k, 2) waypoints of a way out, tried only if the proposal cannot be saved
 
 
@@ -125,7 +125,7 @@ def _modify(query: CheckQuery, beyond_m: float, params: CheckerParams) -> _Candi
 
 def _escape(query: CheckQuery, params: CheckerParams) -> _Candidate | None:
     """The way out, cut short of its first contact, at the widest level that leaves enough of it."""
-    path = None if query.escape_ned_m is None else _path(query.start_ned_m, query.escape_ned_m)
+    path = _path(query.start_ned_m, query.escape_ned_m)
     if path is None:
         return None
     whole = geometry.length(path)
@@ -156,8 +156,10 @@ def _judge(
     return None
 
 
-def _path(start_ned_m: F64, waypoints_ned_m: F64) -> F64 | None:
-    """Start and waypoints as one polyline; None if not finite or going nowhere."""
+def _path(start_ned_m: F64, waypoints_ned_m: F64 | None) -> F64 | None:
+    """Start and waypoints as one polyline; None if absent, not finite or going nowhere."""
+    if waypoints_ned_m is None:
+        return None
     path = np.concatenate((start_ned_m[None, :], waypoints_ned_m))
     if not np.isfinite(path).all() or geometry.length(path) < LEAST_LENGTH_M:
         return None
