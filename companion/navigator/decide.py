@@ -42,7 +42,8 @@ def due(engaged: Engagement, state: VehicleState, percept: Percept, task: Task, 
     left_m = geometry.length(path.vertices_ne_m) - path.s_m
     to_goal = math.hypot(end[0] - task.goal_ned_m[0], end[1] - task.goal_ned_m[1])
     used_up = left_m < params.policy.used_up_m and to_goal > params.policy.used_up_m
-    return used_up or not recheck(path.vertices_ne_m, path.s_m, percept.points_ne_m, params.checker)
+    radius_m = params.checker.recheck_radius_m(params.vehicle.radius_m, path.margin_m)
+    return used_up or not recheck(path.vertices_ne_m, path.s_m, percept.points_ne_m, radius_m)
 
 
 def decide(
@@ -65,7 +66,9 @@ def decide(
     verdict = check(
         CheckQuery(
             start_ned_m=prefix[0],
+            start_vel_ned_m_s=state.vel_ned_m_s[:2],
             goal_ned_m=task.goal_ned_m,
+            radius_m=params.vehicle.radius_m,
             points_ned_m=percept.points_ne_m,
             proposal_ned_m=waypoints,
             escape_ned_m=_escape(state.pos_ned_m[:2], task.goal_ned_m, percept, params),
@@ -73,7 +76,7 @@ def decide(
         params.checker,
     )
     path = None
-    if verdict.path_ned_m is not None:
+    if verdict.path_ned_m is not None and verdict.margin_m is not None:
         path = Path(verdict.path_ned_m, 0.0, verdict.margin_m, state.t_s)
     return memory, replace(engaged, path=path), Decision(waypoints, verdict)
 

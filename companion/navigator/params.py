@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from companion.arbiter.arbiter import ArbiterParams
-from companion.checker.checker import CheckerParams
+from companion.checker.params import CheckerParams
 from companion.core.gridmap import MapParams
 from companion.core.params import param
 from companion.guidance.follower import FollowerParams
