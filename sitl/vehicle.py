@@ -257,7 +257,7 @@ _READ = (
     "forces/fbz-total-lbs",
     "rotor/thrust-lbs",
 )
-_CONTACTS = tuple(f"gear/unit[{i}]/WOW" for i in range(4)) + tuple(f"contact/unit[{i}]/WOW" for i in range(4, 8))
+_CONTACTS = tuple(f"contact/unit[{i}]/WOW" for i in range(8))
 _WRITTEN = (
     "simulation/randomseed",
     "ap/armed",
