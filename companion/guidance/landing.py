@@ -29,6 +29,9 @@ class LandingParams:
     k_perp_d: float = param(0.1, "LND_K_PERP_D", "lateral speed taken off per lateral speed", "", 0.0, 1.0)
     kp_pos: float = param(0.95, "LND_KP_POS", "position gain of the autopilot (MPC_XY_P)", "1/s", 0.1, 5.0)
     r_desc_m: float = param(0.4, "LND_R_DESC", "descent only nearer to the goal than this", "m", 0.05, 5.0)
+    r_touch_m: float = param(0.2, "LND_R_TOUCH", "the same near the ground", "m", 0.05, 5.0)
+    r_slope: float = param(0.1, "LND_R_SLOPE", "how fast the one widens to the other with height", "", 0.0, 2.0)
+    h_commit_m: float = param(0.1, "LND_H_COMMIT", "lower than this the descent goes on anywhere near", "m", 0.0, 1.0)
     psi_desc_rad: float = param(0.35, "LND_PSI_DESC", "descent only with a smaller heading error", "rad", 0.05, 3.2)
     r_yaw_m: float = param(0.5, "LND_R_YAW", "nearer than this the approach direction is kept", "m", 0.0, 5.0)
     k_z: float = param(0.5, "LND_K_Z", "descent rate per metre of height", "1/s", 0.05, 3.0)
@@ -125,12 +128,18 @@ def descent_rate(height_m: float, params: LandingParams) -> float:
     return min(max(params.k_z * height_m, params.vz_min_m_s), params.vz_max_m_s)
 
 
+def descent_radius(height_m: float, params: LandingParams) -> float:
+    """How far from the goal the vehicle may sink: a funnel, open again where it already touches the ground."""
+    if height_m < params.h_commit_m:
+        return params.r_desc_m
+    return min(params.r_touch_m + params.r_slope * height_m, params.r_desc_m)
+
+
 def _aligned(landing: LandingState, state: VehicleState, params: LandingParams) -> LandingState:
     """Yaw towards the goal; once near, the direction is undefined and the last one is kept."""
-    to_goal = landing.line.goal_ned_m - state.pos_ned_m[:2]
-    near = not float(np.hypot(to_goal[0], to_goal[1])) > params.r_yaw_m
-    if near or landing.yaw_kept:
+    if landing.yaw_kept or not _distance_m(landing, state) > params.r_yaw_m:
         return replace(landing, yaw_kept=True)
+    to_goal = landing.line.goal_ned_m - state.pos_ned_m[:2]
     return replace(landing, yaw_ref_rad=math.atan2(float(to_goal[1]), float(to_goal[0])))
 
 
@@ -144,8 +153,8 @@ def _yaw_error_rad(landing: LandingState, state: VehicleState) -> float:
 
 
 def _may_descend(landing: LandingState, state: VehicleState, params: LandingParams) -> bool:
-    near = _distance_m(landing, state) < params.r_desc_m
-    return near and _yaw_error_rad(landing, state) < params.psi_desc_rad
+    radius_m = descent_radius(landing.goal_down_m - float(state.pos_ned_m[2]), params)
+    return _distance_m(landing, state) < radius_m and _yaw_error_rad(landing, state) < params.psi_desc_rad
 
 
 def _lowered(landing: LandingState, down_m: float, dt_s: float, params: LandingParams) -> LandingState:

@@ -92,7 +92,7 @@ def errors(line: GuidanceLine, pos_ned_m: F64, heading_rad: float) -> LineErrors
 
 def done(line: GuidanceLine, pos_ned_m: F64) -> bool:
     """The line is used up."""
-    return not float(line.t @ (pos_ned_m - line.origin_ned_m)) < line.length_m
+    return float(line.t @ (pos_ned_m - line.origin_ned_m)) >= line.length_m
 
 
 def stanley_rad(cross_track_m: float, heading_rad: float, speed_m_s: float, params: LineParams) -> float:
