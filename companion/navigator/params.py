@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from companion.arbiter.arbiter import ArbiterParams
+from companion.arbiter.facts import ArbiterParams
 from companion.checker.params import CheckerParams
 from companion.core.gridmap import MapParams
 from companion.core.params import param
@@ -10,6 +10,7 @@ from companion.guidance.follower import FollowerParams
 from companion.guidance.landing import LandingParams
 from companion.guidance.limits import LimitsParams
 from companion.guidance.line import LineParams
+from companion.link.params import LinkParams
 from companion.perception.perceive import PerceptionParams
 from companion.policy.expert import ExpertParams
 
@@ -40,6 +41,7 @@ class Params:
     """All of it."""
 
     vehicle: VehicleParams = field(default_factory=VehicleParams)
+    link: LinkParams = field(default_factory=LinkParams)
     perception: PerceptionParams = field(default_factory=PerceptionParams)
     map: MapParams = field(default_factory=MapParams)
     arbiter: ArbiterParams = field(default_factory=ArbiterParams)
