@@ -68,6 +68,8 @@ def follow(path_ned_m: F64, state: VehicleState, s_min_m: float, target: Target,
         vel_n, vel_e = speed * math.cos(target.course_rad), speed * math.sin(target.course_rad)
     place_n, place_e = _place(pieces, at.s_m + speed * params.delay_s, path_ned_m)
     here_n, here_e = float(state.pos_ned_m[0]), float(state.pos_ned_m[1])
+    if not at.distance_m < math.inf:
+        here_n, here_e = place_n, place_e
     off_n, off_e = _limited(place_n - here_n, place_e - here_e, params.offset_max_m)
     want_n, want_e = vel_n + params.pull_1_s * off_n, vel_e + params.pull_1_s * off_e
     acc_n, acc_e = _limited(
@@ -122,7 +124,7 @@ def _limited(north: float, east: float, most: float) -> tuple[float, float]:
 
 
 def _share_off_path(distance_m: float, params: FollowerParams) -> float:
-    """Share of the speed kept at a distance from the path; the smallest for NaN."""
-    if not distance_m >= 0.0:
-        return params.off_path_share
+    """Share of the speed kept at a distance from the path; none for a place that is not known."""
+    if not distance_m < math.inf:
+        return 0.0
     return max(params.off_path_share, 1.0 - params.off_path_gain_1_m * max(distance_m - params.off_path_m, 0.0))
