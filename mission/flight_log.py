@@ -32,13 +32,14 @@ class TruthLog:
 
     @property
     def flown(self) -> slice:
-        """From the first row in OFFBOARD to touchdown, or to the end of the log; empty when never in OFFBOARD."""
+        """From the first row in OFFBOARD to the last touchdown, or to the end of a log that ends in the air; empty when
+        never in OFFBOARD."""
         steered = np.flatnonzero(self.offboard & self.armed)
         if not len(steered):
             return slice(0, 0)
-        down = np.flatnonzero((self.landed == LandedState.ON_GROUND) | ~self.armed)
-        after = down[down > steered[0]]
-        return slice(int(steered[0]), int(after[0]) + 1 if len(after) else len(self.t_s))
+        airborne = np.flatnonzero((self.landed != LandedState.ON_GROUND) & self.armed)
+        last = int(airborne[-1]) if len(airborne) else int(steered[0])
+        return slice(int(steered[0]), min(last + 2, len(self.t_s)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,7 +65,8 @@ def judge(plan: FlightPlan, folder: Path, trouble: str | None) -> Result:
     """The verdict on the logs in ``folder``; ``trouble`` is what the operator could not do, if anything."""
     truth, nav = read_truth(folder / "truth.jsonl"), read_navigator(folder / "navigator.jsonl", plan.draws.spawn_ned_m)
     flown = measure(truth, plan.world.goal_ned_m)
-    failure = failure_of(flown, plan, trouble)
+    shortest_m = _shortest_m(plan, flown)
+    failure = failure_of(flown, plan, shortest_m, trouble)
     return Result(
         record_sha256=file_sha256(folder / "navigator.jsonl"),
         truth_sha256=file_sha256(folder / "truth.jsonl"),
@@ -73,7 +74,7 @@ def judge(plan: FlightPlan, folder: Path, trouble: str | None) -> Result:
         reason=failure or f"landed {flown.landing_error_m:.2f} m from the goal",
         time_s=flown.time_s,
         path_m=flown.path_m,
-        path_ratio=_path_ratio(plan, flown),
+        path_ratio=flown.path_m / shortest_m if shortest_m else None,
         min_clearance_m=flown.min_clearance_m if math.isfinite(flown.min_clearance_m) else None,
         collisions=flown.collisions,
         switches=nav.switches,
@@ -109,20 +110,21 @@ def measure(truth: TruthLog, goal_ned_m: F64) -> Flown:
     )
 
 
-def failure_of(flown: Flown, plan: FlightPlan, trouble: str | None) -> str | None:
+def failure_of(flown: Flown, plan: FlightPlan, shortest_m: float | None, trouble: str | None) -> str | None:
     """Why the flight is no success, most severe first; None when it is one."""
-    success = plan.mission.success
     if flown.contact_t_s is not None:
         return f"contact with an obstacle at {flown.contact_t_s:.2f} s"
     if trouble is not None:
         return trouble
     if flown.landing_error_m is None:
         return "not landed and disarmed"
+    success = plan.mission.success
     if not flown.landing_error_m < success.landing_error_m:
         return f"landed {flown.landing_error_m:.2f} m from the goal, allowed are {success.landing_error_m:g} m"
-    if not flown.time_s <= success.time_limit_s:
-        return f"took {flown.time_s:.1f} s, allowed are {success.time_limit_s:g} s"
-    return None
+    limit_s = success.time_limit_s
+    if success.time_ratio is not None and shortest_m is not None:
+        limit_s = min(limit_s, success.time_ratio * shortest_m / plan.mission.cruise_m_s)
+    return None if flown.time_s <= limit_s else f"took {flown.time_s:.1f} s, allowed are {limit_s:.1f} s"
 
 
 def read_timing(path: Path) -> dict[str, float | None]:
@@ -142,8 +144,8 @@ def file_sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes() if path.is_file() else b"").hexdigest()
 
 
-def _path_ratio(plan: FlightPlan, flown: Flown) -> float | None:
+def _shortest_m(plan: FlightPlan, flown: Flown) -> float | None:
     if flown.began_ned_m is None:
         return None
     shortest_m = shortest_path_m(plan.world, flown.began_ned_m, plan.world.goal_ned_m, plan.params.vehicle.radius_m)
-    return flown.path_m / shortest_m if 0.0 < shortest_m < math.inf else None
+    return shortest_m if 0.0 < shortest_m < math.inf else None

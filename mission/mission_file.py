@@ -43,6 +43,7 @@ class Success(StrictModel):
     """What the judge asks for, beside no contact at all."""
 
     time_limit_s: Real = Field(gt=0.0, le=3600.0)  # vehicle time, from the first tick in OFFBOARD to touchdown
+    time_ratio: Real | None = Field(default=None, ge=1.0, le=100.0)  # the same time, over the shortest way at cruise
     landing_error_m: Real = Field(default=0.5, gt=0.0, le=100.0)  # horizontal, touchdown to goal
 
 
