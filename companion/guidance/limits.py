@@ -37,10 +37,14 @@ class LimitsParams:
     corner_share: float = param(0.4, "LIM_CORNER_SHARE", "share of the clearance a corner may be cut by", "", 0.0, 1.0)
     corner_min_m_s: float = param(0.4, "LIM_CORNER_MIN", "speed through the sharpest corner", "m/s", 0.1, 2.0)
     end_gain_1_s: float = param(1.2, "LIM_END_GAIN", "speed per metre left before a standstill", "1/s", 0.2, 3.0)
+    lag_s: float = param(0.2, "LIM_LAG", "how late the vehicle follows a falling speed", "s", 0.0, 1.0)
     side_full_m: float = param(0.8, "LIM_SIDE_FULL", "clearance beside the hull that costs no speed", "m", 0.05, 5.0)
     side_min_m_s: float = param(0.6, "LIM_SIDE_MIN", "speed with no clearance beside the hull", "m/s", 0.1, 5.0)
     fuzzy_full: float = param(0.5, "LIM_FUZZY_FULL", "safety score that costs no speed", "", 0.01, 1.0)
     fuzzy_share: float = param(0.6, "LIM_FUZZY_SHARE", "share of the speed left at safety score 0", "", 0.1, 1.0)
+    stop_tau_s: float = param(
+        0.3, "LIM_STOP_TAU", "as tau, measured, for the stop rule: the last moment", "s", 0.0, 2.0
+    )
     stop_margin_m: float = param(0.06, "LIM_STOP_MARGIN", "widening of the hull for the stop rule", "m", 0.0, 0.5)
     hold_from_m_s: float = param(3.0, "LIM_HOLD_FROM", "from here up hold at once, below ramp down", "m/s", 0.0, 20.0)
     ramp_m_s2: float = param(4.0, "LIM_RAMP", "deceleration of the ramp into a hold", "m/s2", 0.5, 6.0)
@@ -94,7 +98,7 @@ def path_speed(path_ned_m: F64, s_m: float, cruise_m_s: float, ahead: Ahead, par
 
 
 def corridor_speed(d_free_m: float, params: LimitsParams) -> float:
-    """The clamp: stops at once within the free length, and also by gentle braking that the follower can track.
+    """The clamp: stops at once within the free length, and also by gentle braking that the vehicle can track.
 
     The first alone, followed along as the free length shrinks, overruns by a vehicle's lag (0.2 m measured).
     """
@@ -125,13 +129,15 @@ def turn_speed(path_ned_m: F64, s_m: float, clearance_m: float, params: LimitsPa
 
 
 def end_speed(left_m: float, params: LimitsParams) -> float:
-    """Speed with left_m to a standstill at the end of the path: planned braking, then proportional."""
+    """Speed with left_m to a standstill: planned braking, then proportional; read where the vehicle will react."""
     if not left_m > 0.0:
         return 0.0
-    knee = params.brake_m_s2 / (params.end_gain_1_s * params.end_gain_1_s)  # both laws meet here with one slope
-    if left_m <= knee:
-        return params.end_gain_1_s * left_m
-    return math.sqrt(2.0 * params.brake_m_s2 * (left_m - knee / 2.0))
+    brake, gain, lag = params.brake_m_s2, params.end_gain_1_s, params.lag_s
+    knee_m_s = brake / gain  # both laws meet here with one slope
+    tail_m = knee_m_s / gain
+    if left_m <= tail_m + knee_m_s * lag:
+        return left_m * gain / (1.0 + gain * lag)
+    return stopping_speed(left_m - tail_m / 2.0, brake, lag)
 
 
 def side_speed(ahead: Ahead, cruise_m_s: float, params: LimitsParams) -> float:
@@ -157,7 +163,7 @@ def velocity_stop_needed(
         return True
     if speed < STANDING_M_S or len(points_ned_m) == 0:
         return False
-    reach = stopping_distance(speed, params.decel_m_s2, params.tau_s)
+    reach = stopping_distance(speed, params.decel_m_s2, params.stop_tau_s)
     here = np.array(pos_ned_m[:2], dtype=np.float64)
     straight = np.array([here, here + np.array([north, east]) * (reach / speed)])
     wide = radius_m + params.stop_margin_m
@@ -180,7 +186,7 @@ def hold(
     kept = memory or HoldMemory(state.t_s, state.pos_ned_m, state.vel_ned_m_s, yaw_rad)
     speed = math.hypot(float(kept.vel_ned_m_s[0]), float(kept.vel_ned_m_s[1]))
     pos, vel, acc = np.array(kept.pos_ned_m, dtype=np.float64), np.zeros(3), np.zeros(3)
-    if STANDING_M_S <= speed < params.hold_from_m_s:
+    if 0.0 < speed < params.hold_from_m_s:
         course = kept.vel_ned_m_s[:2] / speed
         whole = speed / params.ramp_m_s2
         elapsed = min(max(state.t_s - kept.t_s, 0.0), whole)
