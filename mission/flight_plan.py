@@ -5,7 +5,6 @@ Every draw comes from ``numpy.random.SeedSequence(seed)``, one child per purpose
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,9 +16,9 @@ from companion.core.types import F64
 from companion.navigator.params import Params
 from mission.errors import InputError
 from mission.mission_file import Mission, load_mission
-from mission.strict_yaml import checked, write_yaml
+from mission.strict_yaml import checked
 from mission.world_check import clearance_m
-from mission.world_file import load_world, world_yaml
+from mission.world_file import load_world
 from sitl.world import World
 
 SPAWN_CLEARANCE_M = 0.5  # beyond the radius: take-off in wind drifts
@@ -93,13 +92,6 @@ def draw(mission: Mission, world: World, seed: int, radius_m: float) -> Draws:
     towards_rad = rng.uniform(-math.pi, math.pi)
     wind_ned_m_s = (speed_m_s * math.cos(towards_rad), speed_m_s * math.sin(towards_rad), 0.0)
     return Draws(spawn_ned_m, yaw_rad, wind_ned_m_s, _as_int(sim), _as_int(movers))
-
-
-def write_inputs(plan: FlightPlan, folder: Path) -> None:
-    """Everything needed to fly this again: mission.yaml, world.yaml, params.yaml."""
-    write_yaml(folder / "mission.yaml", plan.mission.model_dump(mode="json"))
-    write_yaml(folder / "params.yaml", core_params.as_dict(plan.params))
-    (folder / "world.yaml").write_text(world_yaml(plan.world), encoding="utf-8")
 
 
 def _draw_spawn(
