@@ -28,6 +28,7 @@ class LidarParams:
     sigma_m: float = 0.01
     dropout: float = 0.0  # chance of a ray to return nothing usable
     latency_s: float = 0.0
+    mount_up_m: float = 0.1  # above the vehicle's position; assumed, as of a sensor on top of the hull
     dither: bool = True
 
     def __post_init__(self) -> None:
@@ -35,12 +36,16 @@ class LidarParams:
             raise ValueError(f"LiDAR: {self.rays} rays do not divide into {self.sectors} sectors")
         if not 0.0 <= self.dropout <= 1.0:
             raise ValueError(f"LiDAR: dropout {self.dropout} is outside [0, 1]")
+        if not 0.0 <= self.sigma_m < math.inf:
+            raise ValueError(f"LiDAR: sigma_m {self.sigma_m} is not a sigma")
+        if not 0.0 < self.rate_hz < math.inf:
+            raise ValueError(f"LiDAR: rate_hz {self.rate_hz} is not a rate")
         if not 0.0 <= self.range_min_m < self.range_max_m:
             raise ValueError(f"LiDAR: range_min_m {self.range_min_m} is not below range_max_m {self.range_max_m}")
 
 
 class Lidar:
-    """A LiDAR in one world. Holds work buffers only."""
+    """A LiDAR in one world: nothing in it changes from scan to scan."""
 
     def __init__(self, world: World, params: LidarParams | None = None, seed: int = 0) -> None:
         self.params = params or LidarParams()
@@ -49,24 +54,29 @@ class Lidar:
         self._boxes = _kernel_boxes(world.boxes)
         bearing_rad = np.arange(self.params.rays) * (math.tau / self.params.rays)
         self._cos_sin = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=1)
-        self._ray_m = np.empty(self.params.rays)
         self.scan(0.0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))  # compile now, not in the first flight tick
 
     def scan(self, t_s: float, pos_world_ned_m: F64, q_ned_frd: F64) -> Scan:
         """The sweep measured at ``t_s`` from a world position (3,) and attitude."""
         p = self.params
         index = round(t_s * p.rate_hz)
-        cast_rays(
-            pos_world_ned_m, q_ned_frd, self._world.at(t_s), self._boxes, self._cos_sin, p.range_max_m, self._ray_m
-        )
-        measure(self._ray_m, self._scan_key(index), p.sigma_m, p.dropout, p.range_min_m, p.range_max_m)
+        ray_m = self.true_ranges(t_s, pos_world_ned_m, q_ned_frd)
+        measure(ray_m, self._scan_key(index), p.sigma_m, p.dropout, p.range_min_m, p.range_max_m)
         width = p.rays // p.sectors
         step = round(DITHER[index % len(DITHER)] * width) if p.dither else 0
         first_ray = step - width // 2
         sector_m = np.empty(p.sectors)
-        sector_minima(self._ray_m, first_ray, sector_m)
+        sector_minima(ray_m, first_ray, sector_m)
         centre_rad = (first_ray + (width - 1) / 2) * (math.tau / p.rays)
         return Scan(t_s, sector_m, centre_rad, math.tau / p.sectors, p.range_min_m, p.range_max_m)
+
+    def true_ranges(self, t_s: float, pos_world_ned_m: F64, q_ned_frd: F64) -> F64:
+        """What every ray (rays,) would read without noise: ray i at bearing i * 2 pi / rays; inf beyond the range."""
+        ray_m = np.empty(self.params.rays)
+        circles = self._world.at(t_s)
+        lens_ned_m = pos_world_ned_m - np.array([0.0, 0.0, self.params.mount_up_m])
+        cast_rays(lens_ned_m, q_ned_frd, circles, self._boxes, self._cos_sin, self.params.range_max_m, ray_m)
+        return ray_m
 
     def _scan_key(self, index: int) -> np.uint64:
         """Counter block of a scan: two counters a ray, disjoint from every other scan's."""

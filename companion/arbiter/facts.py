@@ -26,10 +26,10 @@ class Facts:
 class ArbiterParams:
     """Asymmetric thresholds, debounce and dwell."""
 
-    d_enter_m: float = param(3.0, "ARB_D_ENTER", "RL may start with an obstacle nearer than this", "m", 0.1, 30.0)
-    d_exit_m: float = param(3.5, "ARB_D_EXIT", "RL may end with every obstacle farther than this", "m", 0.1, 30.0)
-    s_enter: float = param(0.85, "ARB_S_ENTER", "RL may start with a safety score below this", "", 0.0, 1.0)
-    s_exit: float = param(0.88, "ARB_S_EXIT", "RL may end with a safety score above this", "", 0.0, 1.0)
+    d_enter_m: float = param(5.0, "ARB_D_ENTER", "RL may start with an obstacle nearer than this", "m", 0.1, 30.0)
+    d_exit_m: float = param(5.5, "ARB_D_EXIT", "RL may end with every obstacle farther than this", "m", 0.1, 30.0)
+    s_enter: float = param(0.88, "ARB_S_ENTER", "RL may start with a safety score below this", "", 0.0, 1.0)
+    s_exit: float = param(0.90, "ARB_S_EXIT", "RL may end with a safety score above this", "", 0.0, 1.0)
     s_land: float = param(0.30, "ARB_S_LAND", "Landing starts only with a safety score above this", "", 0.0, 1.0)
     s_abort: float = param(0.20, "ARB_S_ABORT", "Landing goes on only with a safety score above this", "", 0.0, 1.0)
     d_land_m: float = param(1.0, "ARB_D_LAND", "Landing starts only with obstacles farther than this", "m", 0.1, 30.0)

@@ -23,7 +23,7 @@ I32 = NDArray[np.int32]
 AZIMUTH_BINS = 720  # 0.5 deg: 12 cm at 14 m, finer than a cell
 SUBCELLS = 4  # range and azimuth tables exist for 4 x 4 positions of the vehicle inside its cell
 NEVER = np.float32(0.0)  # stamps are vehicle time, which is positive
-RING_M = (0.0, 0.4, 0.7, 1.0, 1.5, 2.5, 4.0, 7.0)  # inner edges of the rings that share one angular erosion
+RING_M = (0.0, 0.3, 0.5, 0.7, 1.0, 1.4, 1.9, 2.6, 3.5, 4.6, 6.0, 8.0, 11.0)  # inner edges of the rings that share one angular erosion
 CENTRE_BAND_M = 2.0  # the vehicle may stray this far from the middle before the map rolls
 
 AZIMUTH_RAD = (np.arange(AZIMUTH_BINS) + 0.5) * (math.tau / AZIMUTH_BINS)  # bin centres, 0 north, clockwise
@@ -35,7 +35,7 @@ class MapParams:
     """Size and memory of the rolling map."""
 
     cell_m: float = param(0.2, "SN_MAP_CELL", "Edge of a cell", "m", 0.05, 0.5)
-    cells: int = param(160, "SN_MAP_CELLS", "Cells along one side of the map", "", 40, 400)
+    cells: int = param(144, "SN_MAP_CELLS", "Cells along one side of the map", "", 40, 400)
     sense_m: float = param(14.0, "SN_MAP_SENSE", "Ranges beyond this are not entered", "m", 3.0, 40.0)
     certified_s: float = param(
         5.0, "SN_MAP_CERT_T", "A hit may not occupy a cell certified free this lately", "s", 0, 60
@@ -151,9 +151,9 @@ def _shifted(cells: F32, di: int, dj: int, fill: np.float32) -> F32:
 
 
 def _certify(grid: GridMap, free_t: F32, hit_t: F32, scan: PolarScan, params: MapParams) -> None:
-    """Mark every cell that lies wholly inside the proven wedge."""
+    """Mark every cell that lies inside the proven wedge, but for the tips of its corners (a fifth of a cell)."""
     table = _polar_table(params.cell_m, round(params.sense_m / params.cell_m))
-    free_m = np.minimum(scan.free_m, params.sense_m) - params.noise_m
+    free_m = (np.minimum(scan.free_m, params.sense_m) - params.noise_m).astype(np.float32)
     eroded = np.empty((len(RING_M), AZIMUTH_BINS), np.float32)
     for ring, half_width in enumerate(table.half_width_bins):
         minimum_filter1d(free_m, 2 * half_width + 1, output=eroded[ring], mode="wrap")
@@ -208,8 +208,7 @@ class _PolarTable:
 
 @lru_cache(maxsize=4)
 def _polar_table(cell_m: float, radius_cells: int) -> _PolarTable:
-    half_diagonal = cell_m * math.sqrt(0.5)
-    slack = half_diagonal / SUBCELLS  # the vehicle may be anywhere in its sub-cell
+    extent = cell_m / 2 * (1.0 + 1.0 / SUBCELLS)  # of a cell as a disc, seen from anywhere in the vehicle's sub-cell
     steps = np.arange(-radius_cells, radius_cells + 1) + 0.5
     sub = (np.arange(SUBCELLS) + 0.5) / SUBCELLS
     north = (steps[None, :] - sub[:, None])[:, None, :, None] * cell_m
@@ -217,7 +216,7 @@ def _polar_table(cell_m: float, radius_cells: int) -> _PolarTable:
     centre_m = np.hypot(north, east)
     ring = np.searchsorted(RING_M, centre_m, side="right") - 1
     azimuth_bin = np.floor(np.arctan2(east, north) % math.tau / math.tau * AZIMUTH_BINS).astype(np.int32)
-    widths = [math.pi if r <= half_diagonal + slack else math.asin((half_diagonal + slack) / r) for r in RING_M]
-    half_width = tuple(min(AZIMUTH_BINS // 2 - 1, math.ceil(w / math.tau * AZIMUTH_BINS) + 1) for w in widths)
+    widths = [math.pi if r <= extent else math.asin(extent / r) for r in RING_M]
+    half_width = tuple(min(AZIMUTH_BINS // 2 - 1, math.ceil(w / math.tau * AZIMUTH_BINS)) for w in widths)
     ring_bin = (ring * AZIMUTH_BINS + azimuth_bin % AZIMUTH_BINS).astype(np.intp)
-    return _PolarTable(radius_cells, ring_bin, (centre_m + half_diagonal + slack).astype(np.float32), half_width)
+    return _PolarTable(radius_cells, ring_bin, (centre_m + extent).astype(np.float32), half_width)

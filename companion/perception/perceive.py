@@ -23,6 +23,7 @@ class PerceptionParams:
     sense_radius_m: float = param(20.0, "SN_PC_RADIUS", "Sensing radius R of d_min (eq. dmin)", "m", 1.0, 60.0)
     near_m: float = param(2.0, "SN_PC_NEAR", "Range of membership 0 (eq. membership)", "m", 0.1, 20.0)
     far_m: float = param(10.0, "SN_PC_FAR", "Range of membership 1 (eq. membership)", "m", 0.5, 60.0)
+    lidar_up_m: float = param(0.1, "SN_PC_LIDAR_UP", "Height of the LiDAR above the autopilot's position", "m", -1, 2)
     ground_margin_m: float = param(
         0.4, "SN_PC_GROUND", "Returns lower than this above ground are the ground", "m", 0, 3
     )
@@ -60,7 +61,7 @@ def perceive(
 ) -> Percept:
     """Digest one scan."""
     state = inputs.state
-    flat = flatten(inputs.scan, state, params.ground_margin_m)
+    flat = flatten(inputs.scan, state, params.lidar_up_m, params.ground_margin_m)
     grid = update(grid, flat.polar, map_params)
     points = occupied_points(grid, state.t_s, map_params)
     density = local_density(flat.bearing_range_m, params.density_radius_m)

@@ -24,38 +24,42 @@ class Flattened:
     bearing_range_m: F64  # (72,) horizontal range at fixed bearings 0, 5, .. deg off the nose; inf free, nan unknown
 
 
+LEVEL = 1e-3  # a beam that falls less never meets the ground within range
 BEARINGS = 72  # fixed bearings of the score, so that a dithered angle_offset does not move its weights
 BEARING_RAD = np.arange(BEARINGS, dtype=np.float64) * (math.tau / BEARINGS)
 
 
-def flatten(scan: Scan, state: VehicleState, ground_margin_m: float) -> Flattened:
+def flatten(scan: Scan, state: VehicleState, lidar_up_m: float, ground_margin_m: float) -> Flattened:
     """Lay one scan flat.
 
     Args:
         scan: slant ranges in the body plane.
         state: pose at the scan's instant; local NED, ground at down = 0.
+        lidar_up_m: height of the LiDAR above that position.
         ground_margin_m: returns lower than this above the ground are the ground.
     """
     rotation = rotation_ned_frd(state.q_ned_frd)
-    plane = rotation[:2, :2]
-    body = AZIMUTH_DIR @ np.linalg.inv(plane).T  # azimuth directions seen in the body plane, not normalised
-    stretch = 1.0 / np.sqrt(np.einsum("ij,ij->i", body, body))  # |P (cos b, sin b)|: horizontal metres per slant metre
-    bearing = np.arctan2(body[:, 1], body[:, 0])
-    sector = _sector_of(bearing, scan)
-    horizontal = scan.range_m[sector] * stretch
+    ground_m = _ground_slant_m(
+        scan, rotation, _trusted_height_m(lidar_up_m - float(state.pos_ned_m[2]), ground_margin_m)
+    )
+    hit = scan.range_m < ground_m  # false for nan and inf as well: inf < inf
+    proven_m = np.nan_to_num(np.minimum(np.minimum(scan.range_m, scan.range_max_m), ground_m), nan=0.0)
 
-    drop = (body @ rotation[2, :2]) * stretch  # metres down per slant metre
-    height = -float(state.pos_ned_m[2])
-    ground_m = _ground_range_m(drop / stretch, height - ground_margin_m)
-    hit = np.isfinite(horizontal) & (horizontal < ground_m)
-    free_m = np.where(
-        np.isnan(horizontal), 0.0, np.minimum(np.minimum(horizontal, scan.range_max_m * stretch), ground_m)
-    )
-    bins = np.flatnonzero(hit).astype(np.int32)
+    body = AZIMUTH_DIR @ np.linalg.inv(rotation[:2, :2]).T  # azimuth directions seen in the body plane, not normalised
+    stretch = 1.0 / np.sqrt(np.einsum("ij,ij->i", body, body))  # |P (cos b, sin b)|: horizontal metres per slant metre
+    sector = _sector_of(np.arctan2(body[:, 1], body[:, 0]), scan)
+    bins = np.flatnonzero(hit.take(sector)).astype(np.int32)
+    horizontal_m = scan.range_m.take(sector) * stretch
     polar = PolarScan(
-        scan.t_s, state.pos_ned_m[:2].copy(), free_m, bins, horizontal[bins], sector[bins].astype(np.int32)
+        t_s=scan.t_s,
+        pos_ne_m=state.pos_ned_m[:2].copy(),
+        free_m=proven_m.take(sector) * stretch,
+        hit_bin=bins,
+        hit_m=horizontal_m[bins],
+        hit_sector=sector[bins].astype(np.int32),
     )
-    return Flattened(polar, _at_bearings(horizontal, hit, rotation))
+    nothing = np.where(np.isnan(scan.range_m), np.nan, np.inf).take(sector)
+    return Flattened(polar, _at_bearings(np.where(hit.take(sector), horizontal_m, nothing), rotation))
 
 
 def _sector_of(bearing_rad: F64, scan: Scan) -> NDArray[np.intp]:
@@ -67,17 +71,24 @@ def _sector_of(bearing_rad: F64, scan: Scan) -> NDArray[np.intp]:
     return sector
 
 
-def _ground_range_m(drop_per_m: F64, height_m: float) -> F64:
-    """Horizontal range at which beams reach the ground margin; inf for level and rising ones."""
-    if height_m <= 0.0:  # standing on the ground: a level plane never meets it, a tipped one is not believed
-        return np.where(drop_per_m > np.sin(np.radians(3.0)), 0.0, np.inf)
-    falling = drop_per_m > 1e-6
-    return np.where(falling, height_m / np.where(falling, drop_per_m, 1.0), np.inf)
+def _trusted_height_m(height_m: float, margin_m: float) -> float:
+    """Height that a beam may fall before its return could be the ground; half of it close to the ground."""
+    return max(height_m - margin_m if height_m > 2.0 * margin_m else height_m / 2.0, 0.0)
 
 
-def _at_bearings(horizontal_m: F64, hit: NDArray[np.bool_], rotation: F64) -> F64:
-    """Horizontal range at the fixed bearings off the nose; ground returns count as free."""
+def _ground_slant_m(scan: Scan, rotation: F64, height_m: float) -> F64:
+    """Slant range (n,) from which a return of each sector may be the ground; inf for level and rising sectors."""
+    edge = scan.angle_offset_rad + (np.arange(scan.range_m.shape[0] + 1) - 0.5) * scan.increment_rad
+    drop = rotation[2, 0] * np.cos(edge) + rotation[2, 1] * np.sin(edge)  # metres down per slant metre
+    steepest = np.maximum(drop[:-1], drop[1:])
+    peak = int(_sector_of(np.array([math.atan2(rotation[2, 1], rotation[2, 0])]), scan)[0])
+    steepest[peak] = math.hypot(rotation[2, 0], rotation[2, 1])
+    falling = steepest > LEVEL
+    return np.where(falling, height_m / np.where(falling, steepest, 1.0), np.inf)
+
+
+def _at_bearings(horizontal_m: F64, rotation: F64) -> F64:
+    """Ranges at the fixed bearings off the nose."""
     yaw = math.atan2(rotation[1, 0], rotation[0, 0])
-    bins = np.floor(((BEARING_RAD + yaw) % math.tau) * (AZIMUTH_BINS / math.tau)).astype(np.int64) % AZIMUTH_BINS
-    ranges: F64 = np.where(np.isnan(horizontal_m), np.nan, np.where(hit, horizontal_m, np.inf))[bins]
-    return ranges
+    bins = ((BEARING_RAD + yaw) % math.tau * (AZIMUTH_BINS / math.tau)).astype(np.intp) % AZIMUTH_BINS
+    return horizontal_m.take(bins)
