@@ -1,4 +1,4 @@
-"""How does the vehicle move? JSBSim's quadrotor in SI units and local NED; only this file knows feet and pounds.
+"""How does the vehicle move? JSBSim's quadrotor in SI units and local NED; the loops fly inside JSBSim.
 
 Local ned: origin where the vehicle stands at the start (down_m = 0 standing on its legs), the world's axes. The control
 loops run inside JSBSim at physics rate (models/aircraft/mavic2pro); here only setpoints, parameters and truth pass.
@@ -9,24 +9,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from importlib import resources
-from pathlib import Path
 
-import jsbsim
 import numpy as np
 
 from companion.core.frames import euler_rad, quaternion, rotation_ned_frd, wrap_rad
 from companion.core.params import nearest
 from companion.core.types import F64
+from sitl.aircraft import FT_M, FULL_THRUST_N, LB_N, MASS_KG, REST_HEIGHT_M, load, node
 
 DT_S = 0.004  # 250 Hz: 4 cm from the 1 kHz solution over a 40 m slalom of steps
-FT_M = 0.3048
-LB_N = 4.4482216152605
-MASS_KG = 0.907  # mavic2pro.xml
-GRAVITY_M_S2 = 9.80665  # planet.xml
-REST_HEIGHT_M = 0.06 - MASS_KG * GRAVITY_M_S2 / (4 * 400.0)  # legs of 0.06 m on four springs of 400 N/m
-FULL_THRUST_N = 4 * 4.9  # rotors.xml
-
 AXES = "ned"
 ABSENT = (math.nan, math.nan, math.nan)
 Vector = F64 | Sequence[float]
@@ -82,19 +73,18 @@ class Vehicle:
 
     def __init__(self, dt_s: float = DT_S) -> None:
         self.dt_s = dt_s
-        self._fdm = _load(dt_s)
+        self._fdm = load(dt_s)
         self._run = self._fdm.run
-        manager = self._fdm.get_property_manager()
-        self._set = {name: _node(manager, name).set_double_value for name in _WRITTEN}
+        self._set = {name: node(self._fdm, name).set_double_value for name in _WRITTEN}
         self._axes = tuple(
             tuple(self._set[f"{group}-{axis}"] for group in ("sp/pos", "use/pos", "sp/vel", "use/vel", "sp/acc"))
             for axis in AXES
         )
-        self._get = tuple(_node(manager, name).get_double_value for name in _READ)
-        self._touch = tuple(_node(manager, name).get_double_value for name in _CONTACTS)
+        self._get = tuple(node(self._fdm, name).get_double_value for name in _READ)
+        self._touch = tuple(node(self._fdm, name).get_double_value for name in _CONTACTS)
         names = self._fdm.query_property_catalog("param/").split()
-        self._param_nodes = {n.removeprefix("param/"): _node(manager, n) for n in names if n.startswith("param/")}
-        self._params = {name: float(node.get_double_value()) for name, node in self._param_nodes.items()}
+        self._param_nodes = {n.removeprefix("param/"): node(self._fdm, n) for n in names if n.startswith("param/")}
+        self._params = {name: float(n.get_double_value()) for name, n in self._param_nodes.items()}
         self._steps = 0
         self.reset(seed=0)
 
@@ -122,9 +112,9 @@ class Vehicle:
             ("vd-fps", vel_ned_m_s[2] / FT_M),
         ):
             fdm[f"ic/{name}"] = value
-        write["simulation/randomseed"](seed)
+        self._blow(Wind())  # a reset steps the turbulence that it finds
         fdm.reset_to_initial_conditions(0)
-        write["simulation/randomseed"](seed)
+        write["simulation/randomseed"](1 + seed % _SEEDS)
         write["ap/rest-height-m"](REST_HEIGHT_M)
         for name, value in self._params.items():
             self._param_nodes[name].set_double_value(value)
@@ -237,6 +227,7 @@ class Vehicle:
         write[f"{_TURBULENCE}/severity"](float(wind.turbulence))
 
 
+_SEEDS = 2**31 - 2  # JSBSim draws from minstd, whose state is 1 to 2^31 - 2; 0 would repeat 1
 _MILSPEC = 3.0  # atmosphere/turb-type: Milspec (Tustin's variant is slow and drifts)
 _TURBULENCE = "atmosphere/turbulence/milspec"
 _READ = (
@@ -274,33 +265,6 @@ _WRITTEN = (
     f"{_TURBULENCE}/windspeed_at_20ft_AGL-fps",
     f"{_TURBULENCE}/severity",
 )
-
-
-def aircraft_path() -> Path:
-    """Folder of the aircraft models, in a checkout as in an installed wheel."""
-    with resources.as_file(resources.files("models").joinpath("aircraft")) as path:
-        return path
-
-
-def _load(dt_s: float) -> jsbsim.FGFDMExec:
-    base = jsbsim.FGJSBBase()  # type: ignore[no-untyped-call]
-    base.debug_lvl = 0  # static in JSBSim: silences the banner of the next constructor too
-    aircraft = aircraft_path()
-    fdm = jsbsim.FGFDMExec(str(aircraft.parent))
-    fdm.set_debug_level(0)
-    fdm.set_dt(dt_s)
-    fdm.set_aircraft_path(aircraft.name)
-    if not fdm.load_planet(str(aircraft / "mavic2pro" / "planet.xml"), False) or not fdm.load_model("mavic2pro"):
-        raise RuntimeError(f"JSBSim cannot load mavic2pro from {aircraft}")
-    fdm.run_ic()
-    return fdm
-
-
-def _node(manager: jsbsim.FGPropertyManager, name: str) -> jsbsim.FGPropertyNode:
-    node = manager.get_node(name)
-    if node is None:
-        raise KeyError(f"the aircraft has no property '{name}'")
-    return node
 
 
 def _or_absent(vector: Vector | None) -> Vector:

@@ -1,0 +1,39 @@
+"""Where is the aircraft, and how does JSBSim load it? Feet and pounds end here and in ``vehicle``."""
+
+from pathlib import Path
+
+import jsbsim
+
+FT_M = 0.3048
+LB_N = 4.4482216152605
+
+MASS_KG = 0.907  # mavic2pro.xml
+GRAVITY_M_S2 = 9.80665  # planet.xml
+REST_HEIGHT_M = 0.06 - MASS_KG * GRAVITY_M_S2 / (4 * 400.0)  # legs of 0.06 m on four springs of 400 N/m
+FULL_THRUST_N = 4 * 4.9  # rotors.xml
+
+MODELS = Path(__file__).resolve().parent.parent / "models" / "aircraft"  # beside sitl, in a checkout as in a wheel
+NAME = "mavic2pro"
+
+
+def load(dt_s: float) -> jsbsim.FGFDMExec:
+    """A silent JSBSim with the aircraft on its flat planet. Raises RuntimeError naming the folder."""
+    base = jsbsim.FGJSBBase()  # type: ignore[no-untyped-call]
+    base.debug_lvl = 0  # static in JSBSim: silences the banner of the next constructor too
+    fdm = jsbsim.FGFDMExec(str(MODELS.parent))
+    fdm.set_debug_level(0)
+    fdm.set_dt(dt_s)
+    fdm.set_aircraft_path(MODELS.name)
+    # The planet comes first: the model's initial conditions are taken on it.
+    if not fdm.load_planet(str(MODELS / NAME / "planet.xml"), False) or not fdm.load_model(NAME):
+        raise RuntimeError(f"JSBSim cannot load {NAME} from {MODELS}")
+    fdm.run_ic()
+    return fdm
+
+
+def node(fdm: jsbsim.FGFDMExec, name: str) -> jsbsim.FGPropertyNode:
+    """A property that must exist; its bound get and set methods are ten times quicker than access by name."""
+    found = fdm.get_property_manager().get_node(name)
+    if found is None:
+        raise KeyError(f"the aircraft has no property '{name}'")
+    return found
