@@ -21,8 +21,14 @@ VEHICLE_SYSTEM: Final = 1
 VEHICLE_COMPONENT: Final = mav.MAV_COMP_ID_AUTOPILOT1
 COMPANION_COMPONENT: Final = mav.MAV_COMP_ID_ONBOARD_COMPUTER
 
-PX4_MAIN_OFFBOARD: Final = 6  # PX4_CUSTOM_MAIN_MODE_OFFBOARD
-PX4_OFFBOARD: Final = PX4_MAIN_OFFBOARD << 16  # custom_mode of HEARTBEAT
+# PX4_CUSTOM_MAIN_MODE_*, PX4_CUSTOM_SUB_MODE_*; custom_mode of HEARTBEAT is main << 16 | sub << 24.
+PX4_MAIN_AUTO: Final = 4
+PX4_MAIN_OFFBOARD: Final = 6
+PX4_SUB_LOITER: Final = 3
+PX4_OFFBOARD: Final = PX4_MAIN_OFFBOARD << 16
+PX4_HOLD: Final = PX4_MAIN_AUTO << 16 | PX4_SUB_LOITER << 24
+
+STATUSTEXT_CHARS: Final = 50
 
 UNKNOWN_CM: Final = 65535  # "unknown / not used"
 RANGE_MAX_CM: Final = 65533  # leaves max + 1 = "no obstacle" below UNKNOWN_CM
@@ -146,6 +152,23 @@ def decode_landed(extended: Message) -> LandedState:
         return LandedState(extended.landed_state)
     except ValueError:
         return LandedState.UNDEFINED
+
+
+# --- requests and texts -------------------------------------------------------------------------------------------
+
+
+def encode_set_mode(custom_mode: int, target_system: int) -> Message:
+    """COMMAND_LONG DO_SET_MODE for a PX4 ``custom_mode``."""
+    flag = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    main_mode, sub_mode = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
+    return mav.MAVLink_command_long_message(
+        target_system, VEHICLE_COMPONENT, mav.MAV_CMD_DO_SET_MODE, 0, flag, main_mode, sub_mode, 0, 0, 0, 0
+    )
+
+
+def encode_text(text: str, severity: int = mav.MAV_SEVERITY_WARNING) -> Message:
+    """STATUSTEXT; what is longer than 50 characters is cut off."""
+    return mav.MAVLink_statustext_message(severity, text.encode("ascii", "replace")[:STATUSTEXT_CHARS])
 
 
 # --- scan ---------------------------------------------------------------------------------------------------------

@@ -5,12 +5,12 @@ byte. Here a bad frame costs one byte and the search goes on.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from pymavlink.dialects.v20 import common as mav
 
 from companion.core.clock import Clock, SystemClock
-from companion.core.tlog import TlogWriter, packet_length
+from companion.core.tlog import packet_length
 from companion.core.transport import Transport, wait_readable
 
 Message = Any  # a MAVLink_*_message object; pymavlink's classes share no useful static type
@@ -95,6 +95,13 @@ def decode_packet(mavlink: mav.MAVLink, packet: bytes | bytearray) -> Message | 
         return None
 
 
+class PacketLog(Protocol):
+    """Where a connection keeps what it hears and says, for example a TlogWriter."""
+
+    def write(self, wall_us: int, packet: bytes | bytearray) -> None:
+        """Keep one packet."""
+
+
 class Connection:
     """A transport that speaks MAVLink 2 under one system and component id, with an optional log."""
 
@@ -103,14 +110,14 @@ class Connection:
         transport: Transport,
         system: int,
         component: int,
-        tlog: TlogWriter | None = None,
+        log: PacketLog | None = None,
         clock: Clock | None = None,
     ) -> None:
         self.transport = transport
         self.counts = LinkCounts()
         self._mavlink = mav.MAVLink(None, srcSystem=system, srcComponent=component)
         self._parser = PacketParser(self.counts)
-        self._tlog = tlog
+        self._log = log
         self._clock = clock or SystemClock()
         self._sequence: dict[tuple[int, int], int] = {}
 
@@ -120,8 +127,8 @@ class Connection:
         for message in messages:
             packet = message.pack(self._mavlink)
             self._mavlink.seq = (self._mavlink.seq + 1) % SEQUENCES
-            if self._tlog is not None:
-                self._tlog.write(self._clock.wall_us(), packet)
+            if self._log is not None:
+                self._log.write(self._clock.wall_us(), packet)
             chunk += packet
         self.counts.sent += len(messages)
         self.transport.send(chunk)
@@ -133,9 +140,14 @@ class Connection:
         messages = [message for chunk in self.transport.receive() for message in self._parser.feed(chunk)]
         for message in messages:
             self._count_lost(message)
-            if self._tlog is not None:
-                self._tlog.write(self._clock.wall_us(), message.get_msgbuf())
+            if self._log is not None:
+                self._log.write(self._clock.wall_us(), message.get_msgbuf())
         return messages
+
+    def speak_as(self, system: int, component: int) -> None:
+        """Send under other ids from now on."""
+        self._mavlink.srcSystem = system
+        self._mavlink.srcComponent = component
 
     def close(self) -> None:
         """Close the transport; the log belongs to whoever opened it."""

@@ -43,6 +43,11 @@ class Assembler:
         return codec.decode_status(self._heartbeat, self._extended) if self._heartbeat is not None else None
 
     @property
+    def custom_mode(self) -> int | None:
+        """Flight mode of the last HEARTBEAT as PX4 numbers it; None before the first."""
+        return self._heartbeat.custom_mode if self._heartbeat is not None else None
+
+    @property
     def vehicle_time_s(self) -> float:
         """Vehicle time of the newest state sample; -inf before the first."""
         return min(self._position.newest_s, self._attitude.newest_s)

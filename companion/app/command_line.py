@@ -1,0 +1,136 @@
+"""How is the companion started on the drone? ``python -m companion``.
+
+argparse, because a goal has two or three numbers.
+"""
+
+import argparse
+import dataclasses
+import json
+import math
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from companion.app.config import VEHICLE_URL, CompanionConfig, Engage
+from companion.app.run import fly
+from companion.app.status import ExitCode
+from companion.core import params
+from companion.core.params import ParamError
+from companion.core.task import Task
+from companion.core.url import parse_url
+from companion.navigator import Params
+
+CRUISE_M_S = 3.0
+EXAMPLE = """\
+example:
+  python -m companion --vehicle udpin://0.0.0.0:14540 --goal 55 0 -3 --cruise 4 --log flights/first
+"""
+
+
+class InputError(ValueError):
+    """A file given on the command line is wrong; one line."""
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """An argument parser whose complaint is one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say it and exit with 2."""
+        self.exit(int(ExitCode.BAD_INPUT), f"{self.prog}: {message} (try --help)\n")
+
+
+def parser(prog: str = "python -m companion") -> argparse.ArgumentParser:
+    """The options."""
+    options = OneLineParser(
+        prog=prog,
+        description="Fly a PX4-class vehicle with a planar LiDAR to a goal through clutter, and land there.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = options.add_argument
+    add("--vehicle", metavar="URL", help=f"the autopilot, as MAVSDK writes it (default: {VEHICLE_URL})")
+    add("--lidar", metavar="URL", help="where OBSTACLE_DISTANCE comes from (default: the vehicle's link)")
+    add("--goal", metavar="M", type=_number, nargs="+", required=True, help="NORTH EAST [DOWN] from where it booted")
+    add("--cruise", metavar="M_S", type=_number, default=CRUISE_M_S, help="cap of the speed (default: %(default)s)")
+    add("--params", metavar="FILE", type=Path, help="YAML of {group: {field: value}}")
+    add("--log", metavar="DIR", type=Path, help="log folder (default: flights/<UTC>_companion)")
+    add("--engage", choices=list(Engage), type=Engage, default=Engage.WAIT, help="auto: ask for OFFBOARD ourselves")
+    add("--connect-timeout", metavar="S", type=_number, default=30.0, help="give up without a vehicle after this")
+    add("--instance", metavar="N", type=int, default=0, help="added to the port of the default URL")
+    add("--seed", metavar="N", type=int, default=0, help="kept with the flight's log")
+    add("--json", action="store_true", help="print one JSON object at the end")
+    add("--status", action="store_true", help="print a line about the flight now and then")
+    return options
+
+
+def main(arguments: list[str] | None = None, prog: str = "python -m companion") -> int:
+    """Parse, fly, give the exit code."""
+    given = parser(prog).parse_args(arguments)
+    try:
+        config = config_from(given)
+    except (InputError, ParamError) as error:
+        print(error, file=sys.stderr)
+        return int(ExitCode.BAD_INPUT)
+    summary = fly(config, on_status=print_status if given.status else None)
+    if given.json:
+        print(json.dumps(dataclasses.asdict(summary)))
+    return summary.exit_code
+
+
+def config_from(given: argparse.Namespace) -> CompanionConfig:
+    """What the options say. Raises InputError or ParamError."""
+    if len(given.goal) not in (2, 3):
+        raise InputError(f"--goal wants NORTH EAST [DOWN], got {len(given.goal)} numbers")
+    down_m = given.goal[2] if len(given.goal) == 3 else None
+    url = parse_url(VEHICLE_URL)
+    return CompanionConfig(
+        task=Task(np.array(given.goal[:2]), down_m, given.cruise),
+        log_dir=given.log or Path("flights") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}_companion",
+        vehicle_url=given.vehicle or str(dataclasses.replace(url, port=url.port + given.instance)),
+        lidar_url=given.lidar,
+        params=params.update(Params(), read_params(given.params)) if given.params else Params(),
+        engage=given.engage,
+        connect_timeout_s=given.connect_timeout,
+        seed=given.seed,
+    )
+
+
+def read_params(path: Path) -> dict[str, Any]:
+    """The nested overrides of a YAML file. Raises InputError naming file and line."""
+    try:
+        overrides = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+    except (YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: {_first_line(error)}") from error
+    if overrides is None:
+        return {}
+    if not isinstance(overrides, dict):
+        raise InputError(f"{path} wants 'group:' with 'field: value' lines below, got {type(overrides).__name__}")
+    return overrides
+
+
+def print_status(line: object) -> None:
+    """One line about the flight, on stderr: stdout belongs to ``--json``."""
+    print(line, file=sys.stderr, flush=True)
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
+    return value
+
+
+def _first_line(error: Exception) -> str:
+    if isinstance(error, MarkedYAMLError) and error.problem_mark is not None:
+        return f"line {error.problem_mark.line + 1}: {error.problem or 'no YAML'}"
+    return str(error).splitlines()[0]
