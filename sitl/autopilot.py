@@ -77,6 +77,7 @@ class Autopilot:
         self.user_mode = FlightMode.HOLD  # what was asked for; ``mode`` is what is flown
         self.failsafe: Failsafe | None = None
         self.has_flown = False
+        self.armed_time_s = 0.0  # summed up
         self.demand: Demand = IDLE
         self.texts: list[StatusText] = []
         self._state: VehicleState | None = None
@@ -193,6 +194,7 @@ class Autopilot:
 
     def update(self, state: VehicleState, contact: bool) -> None:
         """One control tick; ``contact``: any part touches the ground."""
+        self.armed_time_s += state.t_s - self.t_s if self.armed else 0.0
         self._state = state
         if not self._ready_said and self.ready:
             self._ready_said = True

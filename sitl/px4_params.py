@@ -1,11 +1,14 @@
 """Which of PX4's parameters does this vehicle honour, and what are they set to?
 
-Names, types and defaults are PX4's (v1.16, multicopter). Only parameters that change what the vehicle does are here.
+Names, types and defaults are PX4's (v1.16, multicopter). Only parameters that change what the vehicle does are here;
+those of the control loops (MPC_*, MC_*) come from the aircraft model.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+
+from companion.core.params import nearest
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +44,11 @@ PARAMS: Mapping[str, Px4Param] = {
 
 
 class ParamStore:
-    """Current values by name."""
+    """Current values by name: the autopilot's own, and those of the control loops (``loops``: name to value)."""
 
-    def __init__(self, overrides: Mapping[str, float] | None = None) -> None:
+    def __init__(self, overrides: Mapping[str, float] | None = None, loops: Mapping[str, float] | None = None) -> None:
         self._values: dict[str, int | float] = {name: info.default for name, info in PARAMS.items()}
+        self._values.update(loops or {})
         for name, value in (overrides or {}).items():
             self.set(name, value)
 
@@ -56,11 +60,12 @@ class ParamStore:
 
     def names(self) -> list[str]:
         """Every name, in the order of the parameter index."""
-        return list(self._values)
+        return sorted(self._values)
 
     def set(self, name: str, value: int | float) -> None:
-        """Change one value. Raises KeyError for an unknown name, ValueError for one that is not finite."""
-        kind = type(PARAMS[name].default)
+        """Change one value. Raises KeyError for an unknown name, ValueError for a value that is not finite."""
+        if name not in self._values:
+            raise KeyError(f"unknown PX4 parameter '{name}'{nearest(name, self.names())}")
         if not math.isfinite(value):
-            raise ValueError(f"parameter {name} = {value} is not finite")
-        self._values[name] = kind(value)
+            raise ValueError(f"PX4 parameter '{name}' = {value} is not finite")
+        self._values[name] = type(self._values[name])(value)

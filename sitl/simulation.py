@@ -60,7 +60,6 @@ class Simulation:
     def __init__(self, world: World, config: SimConfig | None = None) -> None:
         self.config = config or SimConfig()
         self.world = world
-        self.autopilot = Autopilot(ParamStore(self.config.px4_params))
         self.rows: list[TruthRow] = []  # one a scan, until the vehicle has disarmed after its flight
         self.contact = False  # ever
         spawn = world.start_ned_m if self.config.spawn_ned_m is None else self.config.spawn_ned_m
@@ -73,6 +72,9 @@ class Simulation:
         self._step = 0
         self._queue: deque[tuple[int, TrajectorySetpoint]] = deque()  # step from which it is in force
         self._vehicle = Vehicle(STEP_MS / 1e3)
+        self.autopilot = Autopilot(ParamStore(loops=self._vehicle.parameters))
+        for name, value in self.config.px4_params.items():
+            self.set_parameter(name, value)
         self._vehicle.reset(self.config.seed, self.config.spawn_yaw_rad, self.config.wind)
         self._applied: Demand | None = None
         self._armed = False
@@ -93,6 +95,11 @@ class Simulation:
     def t_ms(self) -> int:
         """Vehicle time since boot, exact."""
         return self._step * STEP_MS
+
+    @property
+    def step(self) -> int:
+        """Physics steps since boot."""
+        return self._step
 
     @property
     def finished(self) -> bool:
@@ -126,6 +133,16 @@ class Simulation:
             self._queue.pop()  # overtaken by this one
         self._queue.append((due, setpoint))
         self.autopilot.hear_setpoint(self.t_s)
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Change a PX4 parameter. Raises KeyError or ValueError naming it."""
+        self.autopilot.params.set(name, value)
+        if name in self._vehicle.parameters:
+            self._vehicle.set_parameter(name, value)
+
+    def refresh(self) -> None:
+        """Bring ``state`` and ``truth`` up to this instant; between control ticks they lag behind."""
+        self._sense()
 
     # --- one stretch of time ----------------------------------------------------------------------------------
 

@@ -5,7 +5,9 @@ Positions are world ned, everything else as in ``Truth``; numbers are the shorte
 
 import hashlib
 import json
+import math
 from collections.abc import Iterable
+from pathlib import Path
 from typing import NamedTuple
 
 from companion.core.types import F64, LandedState
@@ -35,7 +37,7 @@ def truth_line(row: TruthRow, spawn_ned_m: F64) -> str:
             "vel_ned_m_s": truth.vel_ned_m_s.tolist(),
             "q_ned_frd": truth.q_ned_frd.tolist(),
             "rates_frd_rad_s": truth.rates_frd_rad_s.tolist(),
-            "clearance_m": row.clearance_m if row.clearance_m != float("inf") else None,
+            "clearance_m": row.clearance_m if math.isfinite(row.clearance_m) else None,
             "contact": row.contact,
             "mode": row.mode.name,
             "armed": row.armed,
@@ -52,3 +54,25 @@ def truth_sha256(rows: Iterable[TruthRow], spawn_ned_m: F64) -> str:
     for row in rows:
         digest.update(truth_line(row, spawn_ned_m).encode() + b"\n")
     return digest.hexdigest()
+
+
+class TruthFile:
+    """truth.jsonl, written as the flight goes."""
+
+    def __init__(self, path: Path, spawn_ned_m: F64) -> None:
+        """Create ``path``. Raises OSError when that is not possible."""
+        self._file = path.open("w", encoding="utf-8", newline="\n")
+        self._spawn_ned_m = spawn_ned_m
+
+    def write(self, rows: list[TruthRow]) -> None:
+        """Take the rows out of the list and append them."""
+        self._file.writelines(truth_line(row, self._spawn_ned_m) + "\n" for row in rows)
+        rows.clear()
+
+    def flush(self) -> None:
+        """Bring everything to the disk."""
+        self._file.flush()
+
+    def close(self) -> None:
+        """Flush and close; may be called twice."""
+        self._file.close()

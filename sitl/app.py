@@ -1,0 +1,109 @@
+"""How does the vehicle run as a program? Opens ports and logs, runs until told to stop, closes everything.
+
+Exit code 0 after SIGINT or SIGTERM; 2 with one line for a wrong configuration, a port in use or a log folder that
+cannot be written.
+"""
+
+import contextlib
+import importlib.metadata
+import json
+import platform
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Final
+
+from companion.core.clock import SystemClock
+from companion.core.transport import TransportError
+from sitl.link import SPECS, bind, open_links
+from sitl.server import Server
+from sitl.simulation import Simulation
+from sitl.truth_log import TruthFile
+from sitl.vehicle_config import ConfigError, VehicleConfig
+
+EXIT_OK: Final = 0
+EXIT_BAD_INPUT: Final = 2
+PACKAGES: Final = ("swiftnav", "jsbsim", "numpy", "numba", "pymavlink", "python-fcl")
+
+Say = Callable[[str], None]
+
+
+def run(config: VehicleConfig, say: Say | None = None) -> int:
+    """The vehicle, until a signal. Returns the exit code. ``say`` takes one line at a time; None: stderr."""
+    tell = say or _to_stderr
+    with _stop_on_signals() as stopped, ExitStack() as stack:
+        try:
+            server = _open(config, stack, tell)
+        except (TransportError, ConfigError) as error:
+            tell(str(error))
+            return EXIT_BAD_INPUT
+        except OSError as error:
+            tell(f"log folder {config.log_dir} cannot be written: {error.strerror or error}")
+            return EXIT_BAD_INPUT
+        tell(_ready_line(config))
+        server.run(stopped)
+        server.flush()
+    return EXIT_OK
+
+
+def _open(config: VehicleConfig, stack: ExitStack, say: Say) -> Server:
+    """Everything that can be refused, before anything is written."""
+    clock = SystemClock()
+    try:
+        sim = Simulation(config.world, config.sim)
+    except (KeyError, ValueError) as error:
+        raise ConfigError(str(error.args[0])) from error
+    bound = bind(config.instance, clock)
+    for _, transport in bound:
+        stack.callback(transport.close)
+    truth = None
+    if config.log_dir is not None:
+        config.log_dir.mkdir(parents=True, exist_ok=True)
+        truth = TruthFile(config.log_dir / "truth.jsonl", sim.spawn_ned_m)
+        stack.callback(truth.close)
+        _write_versions(config, config.log_dir / "sitl.json")
+    links = open_links(bound, config.system_id, config.log_dir, clock)
+    for link in links:
+        stack.callback(link.close)
+    return Server(sim, links, config.run, clock, config.system_id, truth, say)
+
+
+@contextlib.contextmanager
+def _stop_on_signals() -> Iterator[Callable[[], bool]]:
+    """A question that is answered with True once SIGINT or SIGTERM has come."""
+    asked: list[int] = []
+
+    def remember(number: int, _frame: Any) -> None:
+        asked.append(number)
+
+    before = {number: signal.signal(number, remember) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(asked)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _write_versions(config: VehicleConfig, path: Path) -> None:
+    """What flew: configuration, seed and versions."""
+    versions = {name: _version(name) for name in PACKAGES}
+    facts = {"python": platform.python_version(), "platform": platform.platform(), "versions": versions}
+    path.write_text(json.dumps({**facts, "config": config.to_json()}, indent=1) + "\n", encoding="utf-8")
+
+
+def _version(package: str) -> str | None:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _ready_line(config: VehicleConfig) -> str:
+    ports = ", ".join(f"{spec.name} udp {spec.remote_port + config.instance}" for spec in SPECS)
+    return f"vehicle {config.system_id} in world {config.world.name}: {ports}"
+
+
+def _to_stderr(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,90 @@
+"""Whom does the vehicle talk to, over which ports, and how often? PX4's links; each has rates and a log of its own."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from companion.core.clock import Clock
+from companion.core.mavlink import Connection
+from companion.core.tlog import TlogWriter
+from companion.core.transport import Transport, TransportError
+from companion.core.udp import udp_out
+from sitl.streams import GCS_HZ, NAVIGATION, ONBOARD_HZ, StreamSchedule
+
+Message = Any  # a MAVLink_*_message object
+
+HOST: Final = "127.0.0.1"
+COMPONENT: Final = 1  # MAV_COMP_ID_AUTOPILOT1
+
+
+@dataclass(frozen=True, slots=True)
+class LinkSpec:
+    """One of PX4's MAVLink instances; instance N of the vehicle adds N to both ports."""
+
+    name: str
+    local_port: int
+    remote_port: int
+    rates_hz: Mapping[int, float]
+    companion: bool = False
+
+
+SPECS: Final = (
+    LinkSpec("companion", 14580, 14540, ONBOARD_HZ, companion=True),
+    LinkSpec("operator", 14280, 14030, ONBOARD_HZ),  # PX4's payload port, here at full rate
+    LinkSpec("gcs", 18570, 14550, GCS_HZ),
+)
+
+
+class Link:
+    """One connection with its stream rates: ``wall`` by wall time, ``vehicle`` by vehicle time (companion only)."""
+
+    def __init__(self, spec: LinkSpec, connection: Connection, tlog: TlogWriter | None = None) -> None:
+        self.name = spec.name
+        self.companion = spec.companion
+        self.connection = connection
+        by_vehicle = NAVIGATION if spec.companion else frozenset[int]()
+        self.wall = StreamSchedule({i: hz for i, hz in spec.rates_hz.items() if i not in by_vehicle})
+        self.vehicle = StreamSchedule({i: hz for i, hz in spec.rates_hz.items() if i in by_vehicle})
+        self._tlog = tlog
+
+    @property
+    def schedules(self) -> tuple[StreamSchedule, ...]:
+        """Both, for commands that change a rate."""
+        return (self.wall, self.vehicle)
+
+    def flush(self) -> None:
+        """Bring the log to the disk."""
+        if self._tlog is not None:
+            self._tlog.flush()
+
+    def close(self) -> None:
+        """Free the port, close the log."""
+        self.connection.close()
+        if self._tlog is not None:
+            self._tlog.close()
+
+
+def bind(instance: int, clock: Clock) -> list[tuple[LinkSpec, Transport]]:
+    """The ports of one vehicle. Raises TransportError naming a port in use; nothing stays open then."""
+    bound: list[tuple[LinkSpec, Transport]] = []
+    try:
+        for spec in SPECS:
+            udp = udp_out(HOST, spec.remote_port + instance, spec.local_port + instance, clock)
+            bound.append((spec, udp))
+    except TransportError:
+        for _, transport in bound:
+            transport.close()
+        raise
+    return bound
+
+
+def open_links(
+    bound: list[tuple[LinkSpec, Transport]], system_id: int, log_dir: Path | None, clock: Clock
+) -> list[Link]:
+    """Links over bound ports, each with a log in ``log_dir``. Raises OSError when that cannot be written."""
+    links = []
+    for spec, transport in bound:
+        tlog = TlogWriter(log_dir / f"vehicle_{spec.name}.tlog") if log_dir is not None else None
+        links.append(Link(spec, Connection(transport, system_id, COMPONENT, tlog, clock), tlog))
+    return links
