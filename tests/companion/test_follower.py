@@ -122,6 +122,14 @@ def test_progress_never_jumps_to_the_other_leg_of_a_hairpin() -> None:
     assert s_m > 10.3
 
 
+def test_a_vehicle_blown_onto_the_other_leg_goes_back_to_its_own() -> None:
+    hairpin = np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 1.0], [0.0, 1.0]])
+    blown = PointMass((2.0, 0.95))
+    followed = follow(hairpin, blown.state(), 1.9, Target(1.0, DOWN_M, 0.0), PARAMS)
+    assert followed.s_m == pytest.approx(2.0)
+    assert followed.setpoint.pos_ned_m is not None and followed.setpoint.pos_ned_m[1] < 0.3
+
+
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.0, 3.0))
 @settings(max_examples=50, deadline=None)
 def test_a_mirrored_state_gives_the_mirrored_setpoint(pos_e: float, vel_n: float, vel_e: float, speed: float) -> None:

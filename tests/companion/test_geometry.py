@@ -14,7 +14,7 @@ RADIUS_M = 0.4
 GRAIN_M = 1e-4  # points are tiny spheres for the oracle
 COORDINATE = st.floats(-6.0, 6.0).map(lambda x: round(x, 3))
 VERTICES = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=2, max_size=6).map(np.array)
-POINTS = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=1, max_size=25).map(np.array)
+POINTS = st.lists(st.tuples(COORDINATE, COORDINATE), min_size=1, max_size=12).map(np.array)
 PLACE = st.tuples(COORDINATE, COORDINATE).map(np.array)
 
 
@@ -53,6 +53,20 @@ def test_a_swept_disc_touches_exactly_when_fcl_says_so(path: F64, points: F64) -
     assert touches == oracle_touches(path, points, RADIUS_M)
 
 
+@pytest.mark.parametrize("bearing_deg", range(0, 360, 15))
+@pytest.mark.parametrize(("distance_m", "touches"), [(RADIUS_M - 0.001, True), (RADIUS_M + 0.001, False)])
+def test_a_lone_point_beside_either_end_is_touched_inside_the_radius_only(
+    bearing_deg: int, distance_m: float, touches: bool
+) -> None:
+    bearing = math.radians(bearing_deg)
+    there = np.array([math.cos(bearing), math.sin(bearing)])
+    path = np.array([[5.0, 5.0], [3.0, 0.0], [0.0, 0.0]]) - 2.0 * there  # ends where no other piece comes near
+    point = path[-1] + distance_m * there
+    if math.dist(geometry.point_at(path, geometry.project(path, point).s_m), path[-1]) < 1e-9:
+        free = geometry.swept_free_length(path, point[None], RADIUS_M)
+        assert (free < geometry.length(path)) is touches
+
+
 @given(VERTICES, POINTS)
 @settings(max_examples=150, deadline=None)
 def test_up_to_the_free_length_nothing_is_touched_and_just_beyond_it_is(path: F64, points: F64) -> None:
@@ -74,6 +88,14 @@ def test_distances_equal_those_to_a_densely_sampled_polyline(path: F64, points: 
     exact = geometry.points_to_polyline_distance(path, points)
     assert (exact <= brute + 1e-9).all()
     assert (brute - exact <= 0.006).all()
+
+
+@given(VERTICES, POINTS, st.floats(0.0, 2.0))
+@settings(max_examples=100, deadline=None)
+def test_every_point_within_reach_is_among_the_near_ones(path: F64, points: F64, reach_m: float) -> None:
+    near = {tuple(point) for point in geometry.points_near(path, points, reach_m)}
+    within = points[geometry.points_to_polyline_distance(path, points) < reach_m - 1e-9]
+    assert {tuple(point) for point in within} <= near
 
 
 @given(VERTICES, PLACE)

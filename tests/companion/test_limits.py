@@ -106,6 +106,15 @@ def test_corners_ahead_slow_down_and_sharper_ones_more() -> None:
     assert speeds[0] == 3.0 and speeds[-1] == PARAMS.corner_min_m_s
 
 
+@given(st.floats(0.0, 2.95), st.floats(0.0, 0.3))
+@settings(max_examples=60, deadline=None)
+def test_before_a_corner_no_more_than_the_planned_braking_is_needed(s_m: float, step_m: float) -> None:
+    corner = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0]])
+    now, later = limits.turn_speed(corner, s_m, 1.0, PARAMS), limits.turn_speed(corner, s_m + step_m, 1.0, PARAMS)
+    if s_m + step_m < 3.0:
+        assert now * now - later * later <= 2.0 * PARAMS.brake_m_s2 * step_m + 1e-9
+
+
 def test_a_corner_is_cut_less_where_there_is_less_room() -> None:
     corner = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0]])
     assert limits.turn_speed(corner, 2.9, 0.1, PARAMS) < limits.turn_speed(corner, 2.9, 1.0, PARAMS)
