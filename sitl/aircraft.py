@@ -15,6 +15,45 @@ FULL_THRUST_N = 4 * 4.9  # rotors.xml
 MODELS = Path(__file__).resolve().parent.parent / "models" / "aircraft"  # beside sitl, in a checkout as in a wheel
 NAME = "mavic2pro"
 
+AXES = "ned"
+# Properties that ``vehicle`` reads for its truth, in that order, and those that it writes.
+TURBULENCE = "atmosphere/turbulence/milspec"
+READ = (
+    "position/ecef-z-ft",
+    "position/ecef-y-ft",
+    "position/h-sl-ft",
+    "velocities/v-north-fps",
+    "velocities/v-east-fps",
+    "velocities/v-down-fps",
+    "attitude/phi-rad",
+    "attitude/theta-rad",
+    "attitude/psi-rad",
+    "velocities/p-rad_sec",
+    "velocities/q-rad_sec",
+    "velocities/r-rad_sec",
+    "forces/fbx-total-lbs",
+    "forces/fby-total-lbs",
+    "forces/fbz-total-lbs",
+    "rotor/thrust-lbs",
+)
+CONTACTS = tuple(f"contact/unit[{i}]/WOW" for i in range(8))
+WRITTEN = (
+    "simulation/randomseed",
+    "ap/armed",
+    "ap/mode",
+    "ap/rest-height-m",
+    *(f"{group}-{axis}" for group in ("sp/pos", "sp/vel", "sp/acc", "sp/z", "use/pos", "use/vel") for axis in AXES),
+    *(f"sp/{axis}-rad_s" for axis in "pqr"),
+    "sp/yaw-rad",
+    "sp/yaw-rate-rad_s",
+    "use/yaw",
+    "sp/thrust",
+    *(f"atmosphere/wind-{axis}-fps" for axis in ("north", "east", "down")),
+    "atmosphere/turb-type",
+    f"{TURBULENCE}/windspeed_at_20ft_AGL-fps",
+    f"{TURBULENCE}/severity",
+)
+
 
 def load(dt_s: float) -> jsbsim.FGFDMExec:
     """A silent JSBSim with the aircraft on its flat planet. Raises RuntimeError naming the folder."""

@@ -15,11 +15,25 @@ import numpy as np
 from companion.core.frames import euler_rad, quaternion, rotation_ned_frd, wrap_rad
 from companion.core.params import nearest
 from companion.core.types import F64
-from sitl.aircraft import FT_M, FULL_THRUST_N, LB_N, MASS_KG, REST_HEIGHT_M, load, node
+from sitl.aircraft import (
+    AXES,
+    CONTACTS,
+    FT_M,
+    FULL_THRUST_N,
+    LB_N,
+    MASS_KG,
+    READ,
+    REST_HEIGHT_M,
+    TURBULENCE,
+    WRITTEN,
+    load,
+    node,
+)
 
 DT_S = 0.004  # 250 Hz: 4 cm from the 1 kHz solution over a 40 m slalom of steps
-AXES = "ned"
 ABSENT = (math.nan, math.nan, math.nan)
+_SEEDS = 2**31 - 2  # JSBSim draws from minstd, whose state is 1 to 2^31 - 2; 0 would repeat 1
+_MILSPEC = 3.0  # atmosphere/turb-type: Milspec (Tustin's variant is slow and drifts)
 Vector = F64 | Sequence[float]
 
 
@@ -75,13 +89,13 @@ class Vehicle:
         self.dt_s = dt_s
         self._fdm = load(dt_s)
         self._run = self._fdm.run
-        self._set = {name: node(self._fdm, name).set_double_value for name in _WRITTEN}
+        self._set = {name: node(self._fdm, name).set_double_value for name in WRITTEN}
         self._axes = tuple(
             tuple(self._set[f"{group}-{axis}"] for group in ("sp/pos", "use/pos", "sp/vel", "use/vel", "sp/acc"))
             for axis in AXES
         )
-        self._get = tuple(node(self._fdm, name).get_double_value for name in _READ)
-        self._touch = tuple(node(self._fdm, name).get_double_value for name in _CONTACTS)
+        self._get = tuple(node(self._fdm, name).get_double_value for name in READ)
+        self._touch = tuple(node(self._fdm, name).get_double_value for name in CONTACTS)
         names = self._fdm.query_property_catalog("param/").split()
         self._param_nodes = {n.removeprefix("param/"): node(self._fdm, n) for n in names if n.startswith("param/")}
         self._params = {name: float(n.get_double_value()) for name, n in self._param_nodes.items()}
@@ -223,48 +237,8 @@ class Vehicle:
         for axis, speed in zip(("north", "east", "down"), wind.mean_ned_m_s, strict=True):
             write[f"atmosphere/wind-{axis}-fps"](speed / FT_M)
         write["atmosphere/turb-type"](_MILSPEC if wind.turbulence else 0.0)
-        write[f"{_TURBULENCE}/windspeed_at_20ft_AGL-fps"](wind.turbulence.w20_m_s / FT_M)
-        write[f"{_TURBULENCE}/severity"](float(wind.turbulence))
-
-
-_SEEDS = 2**31 - 2  # JSBSim draws from minstd, whose state is 1 to 2^31 - 2; 0 would repeat 1
-_MILSPEC = 3.0  # atmosphere/turb-type: Milspec (Tustin's variant is slow and drifts)
-_TURBULENCE = "atmosphere/turbulence/milspec"
-_READ = (
-    "position/ecef-z-ft",
-    "position/ecef-y-ft",
-    "position/h-sl-ft",
-    "velocities/v-north-fps",
-    "velocities/v-east-fps",
-    "velocities/v-down-fps",
-    "attitude/phi-rad",
-    "attitude/theta-rad",
-    "attitude/psi-rad",
-    "velocities/p-rad_sec",
-    "velocities/q-rad_sec",
-    "velocities/r-rad_sec",
-    "forces/fbx-total-lbs",
-    "forces/fby-total-lbs",
-    "forces/fbz-total-lbs",
-    "rotor/thrust-lbs",
-)
-_CONTACTS = tuple(f"contact/unit[{i}]/WOW" for i in range(8))
-_WRITTEN = (
-    "simulation/randomseed",
-    "ap/armed",
-    "ap/mode",
-    "ap/rest-height-m",
-    *(f"{group}-{axis}" for group in ("sp/pos", "sp/vel", "sp/acc", "sp/z", "use/pos", "use/vel") for axis in AXES),
-    *(f"sp/{axis}-rad_s" for axis in "pqr"),
-    "sp/yaw-rad",
-    "sp/yaw-rate-rad_s",
-    "use/yaw",
-    "sp/thrust",
-    *(f"atmosphere/wind-{axis}-fps" for axis in ("north", "east", "down")),
-    "atmosphere/turb-type",
-    f"{_TURBULENCE}/windspeed_at_20ft_AGL-fps",
-    f"{_TURBULENCE}/severity",
-)
+        write[f"{TURBULENCE}/windspeed_at_20ft_AGL-fps"](wind.turbulence.w20_m_s / FT_M)
+        write[f"{TURBULENCE}/severity"](float(wind.turbulence))
 
 
 def _or_absent(vector: Vector | None) -> Vector:
