@@ -11,8 +11,6 @@ GOOD = {
     "bounds": {"north": [-5.0, 25.0], "east": [-5.0, 5.0]},
     "cylinders": [{"at": [10.0, 0.0], "radius_m": 0.5}],
 }
-FENCE = {"between": [[10.0, -5.5], [10.0, 5.5]]}
-NARROW = [{"between": [[12.0, -5.5], [12.0, -0.3]]}, {"between": [[12.0, 0.3], [12.0, 5.5]]}]
 
 
 @pytest.mark.parametrize(
