@@ -134,14 +134,20 @@ class Companion:
             return
         ticked_s = self._clock.now_s()
         self._send(answer.setpoint)
-        self._keep(answer, inputs, (ticked_s - began_s) * 1e3, (self._clock.now_s() - arrived_s) * 1e3)
+        timing = {
+            "t_s": inputs.scan.t_s,
+            "wall_s": arrived_s,
+            "tick_ms": (ticked_s - began_s) * 1e3,
+            "loop_ms": (self._clock.now_s() - arrived_s) * 1e3,
+            "decision": decided(answer.row),
+        }
+        self._keep(answer, timing)
         if answer.over:
             self._finish(ExitCode.LANDED, "landed and disarmed")
 
-    def _keep(self, answer: Answer, inputs: Inputs, tick_ms: float, loop_ms: float) -> None:
-        timing = {"t_s": inputs.scan.t_s, "tick_ms": tick_ms, "loop_ms": loop_ms, "decision": decided(answer.row)}
+    def _keep(self, answer: Answer, timing: dict[str, Any]) -> None:
         self._logs.tick(answer.row, timing)
-        self._status = status_line(answer.row, tick_ms)
+        self._status = status_line(answer.row, timing["tick_ms"])
 
     def _tick_failed(self, error: Exception, inputs: Inputs) -> None:
         self._logs.event("navigator failed", exc_info=True, t_s=inputs.scan.t_s)

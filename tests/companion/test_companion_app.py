@@ -1,0 +1,393 @@
+"""Does the process keep its promises, in good flights and bad? In one thread, on a clock moved by hand."""
+
+import itertools
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from pretend_vehicle import STEP_S, PretendVehicle
+
+from companion import navigator
+from companion.app.config import CompanionConfig, Engage
+from companion.app.logs import EVENTS, PACKETS, RECORDS, TIMINGS, FlightLogs, record_line
+from companion.app.process import Companion
+from companion.app.session import Session
+from companion.app.signals import StopRequest
+from companion.core import codec
+from companion.core.clock import ManualClock
+from companion.core.inputs import Inputs
+from companion.core.lossy import Loss, LossyTransport
+from companion.core.mavlink import Connection
+from companion.core.task import Task
+from companion.core.transport import pair
+from companion.core.types import LandedState, Setpoint
+from companion.link.replay import replay
+
+TASK = Task(np.array([8.0, 2.0]), -3.0, 3.0)
+
+
+class HoldNavigator:
+    """Asks for one place, for ever; raises or asks for nonsense where it is told to."""
+
+    def __init__(self, place: tuple[float, float, float] = (5.0, 0.0, -3.0)) -> None:
+        self.place = np.array(place)
+        self.fail: Callable[[float], bool] = lambda _t_s: False
+        self.ticks: list[Inputs] = []
+
+    def start(self, _params: Any) -> int:
+        return 0
+
+    def tick(self, memory: int, inputs: Inputs, _task: Task, _params: Any) -> tuple[int, Setpoint, Any]:
+        self.ticks.append(inputs)
+        if self.fail(inputs.scan.t_s):
+            raise ZeroDivisionError("a bug of ours")
+        place = self.place if inputs.status.offboard else inputs.state.pos_ned_m
+        row = {"t_s": inputs.scan.t_s, "mode": "travel" if inputs.status.offboard else "standby", "n": memory}
+        return memory + 1, Setpoint(inputs.state.t_s, place, None, None, 0.0), SimpleNamespace(as_dict=lambda: row)
+
+
+@dataclass
+class Bench:
+    """Vehicle and companion joined by an in-process link."""
+
+    tmp_path: Path
+    brain: Any = field(default_factory=HoldNavigator)
+    engage: Engage = Engage.WAIT
+    loss: Loss | None = None
+    own_lidar: bool = False
+
+    def __post_init__(self) -> None:
+        self.clock = ManualClock()
+        self.stop = StopRequest()
+        self.said: list[str] = []
+        near, far = pair("pair://vehicle")
+        ends = [near]
+        lidar = None
+        if self.own_lidar:
+            lidar_near, lidar_far = pair("pair://lidar")
+            ends.append(lidar_near)
+            lidar = Connection(lidar_far, 1, 195)
+        self.vehicle = PretendVehicle(Connection(far, 1, 1), lidar)
+        config = CompanionConfig(TASK, self.tmp_path / "log", engage=self.engage, connect_timeout_s=5.0)
+        self.logs = FlightLogs(config.log_dir)
+        transports = ends if self.loss is None else [LossyTransport(end, self.loss, 3, self.clock) for end in ends]
+        links = [Connection(transport, 1, 191, self.logs, self.clock) for transport in transports]
+        self.companion = Companion(config, links, self.logs, self.brain, self.clock)
+        self.companion.say = self.said.append
+
+    def run(self, duration_s: float) -> None:
+        """Both sides, until then or until the companion ends."""
+        for _ in range(round(duration_s / STEP_S)):
+            if self.companion.exit_code is not None:
+                return
+            self.vehicle.step()
+            self.clock.sleep_s(STEP_S)
+            self.companion.turn(self.stop, wait_s=0.0)
+        self.vehicle.listen()
+
+    def rows(self, name: str) -> list[dict[str, Any]]:
+        self.logs.flush()
+        return [json.loads(line) for line in (self.tmp_path / "log" / name).read_text().splitlines()]
+
+
+def test_before_offboard_every_scan_is_answered_with_where_the_vehicle_is(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, brain=navigator)
+    bench.run(2.0)
+    vehicle = bench.vehicle
+    assert [sp.t_s for sp in vehicle.setpoints] == [round(k * STEP_S, 6) for k in range(1, vehicle.k + 1)]
+    for setpoint in vehicle.setpoints:
+        np.testing.assert_array_equal(setpoint.pos_ned_m, vehicle.pos_ned_m)
+        assert (setpoint.vel_ned_m_s, setpoint.acc_ned_m_s2, setpoint.yaw_rad) == (None, None, 0.0)
+    assert vehicle.mode_requests == []
+    assert bench.said == ["vehicle 1 heard on pair://vehicle"]
+
+
+def test_the_navigator_flies_to_the_goal_lands_and_the_run_is_over(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, brain=navigator)
+    bench.run(1.0)
+    bench.vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(60.0)
+    assert (bench.companion.exit_code, bench.companion.reason) == (0, "landed and disarmed")
+    assert np.linalg.norm(bench.vehicle.pos_ned_m[:2] - TASK.goal_ned_m) < 0.5
+    rows = bench.rows(RECORDS)
+    assert {"standby", "travel", "landing"} <= {row["mode"] for row in rows}
+    assert [row["t_s"] for row in rows] == [round(k * STEP_S, 6) for k in range(1, bench.vehicle.k + 1)]
+    assert len(bench.rows(TIMINGS)) == len(rows)
+    assert bench.rows(TIMINGS)[0].keys() == {"t_s", "wall_s", "tick_ms", "loop_ms", "decision"}
+    assert rows[-1]["mode"] == "standby"  # the scan that found it disarmed was answered, and no further one
+
+
+def test_a_replay_of_the_log_gives_the_same_records_byte_for_byte(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, brain=navigator)
+    bench.run(0.4)
+    bench.vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(60.0)
+    bench.logs.close()
+    session = Session(TASK, navigator.Params(), navigator)
+    again = b"".join(record_line(session.tick(i).row) for i in replay(tmp_path / "log" / PACKETS))
+    assert again == (tmp_path / "log" / RECORDS).read_bytes()
+    assert bench.logs.ticks > 100
+
+
+def test_the_companion_introduces_itself_once_a_second_and_is_no_vehicle(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.run(10.0)
+    assert len(bench.vehicle.heartbeats) in (10, 11, 12)
+    for heartbeat in bench.vehicle.heartbeats:
+        assert (heartbeat.get_srcSystem(), heartbeat.get_srcComponent()) == (1, 191)
+        assert (heartbeat.type, heartbeat.autopilot, heartbeat.base_mode) == (18, 8, 0)
+
+
+def test_a_vehicle_with_another_system_id_is_spoken_to_by_its_id(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.vehicle.link.speak_as(3, 1)
+    bench.run(2.5)
+    assert bench.vehicle.setpoints
+    assert bench.vehicle.heartbeats[-1].get_srcSystem() == 3
+
+
+def test_no_vehicle_within_the_time_given_is_one_line(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.vehicle.sends_anything = False
+    bench.run(6.0)
+    assert bench.companion.exit_code == 3
+    assert bench.said == ["no vehicle answered on udpin://0.0.0.0:14540 within 5 s"]
+
+
+def test_a_vehicle_that_falls_silent_in_flight_ends_the_run(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(1.0)
+    bench.vehicle.sends_anything = False
+    bench.run(2.9)
+    assert bench.companion.exit_code is None
+    bench.run(0.3)
+    assert bench.companion.exit_code == 4
+    assert bench.said[-1] == "vehicle lost: nothing heard for 3 s"
+
+
+def test_a_vehicle_clock_that_stands_still_while_it_speaks_is_not_lost(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.run(1.0)
+    for _ in range(200):
+        bench.vehicle.link.send(codec.encode_vehicle_heartbeat(157, codec.PX4_HOLD, 4))
+        bench.clock.sleep_s(0.1)
+        bench.companion.turn(bench.stop, wait_s=0.0)
+    assert bench.companion.exit_code is None
+
+
+def test_a_scan_that_stops_in_flight_brakes_holds_says_so_and_goes_on_when_it_is_back(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, brain=HoldNavigator((100.0, 0.0, -3.0)))
+    vehicle = bench.vehicle
+    vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(2.0)
+    vehicle.sends_scans = False
+    bench.run(0.6)
+    assert vehicle.texts == ["swiftnav: scan lost, holding"]
+    before = len(vehicle.setpoints)
+    ticks = bench.logs.ticks
+    bench.run(2.0)
+    held = vehicle.setpoints[before:]
+    assert len(held) >= 20
+    assert max(b.t_s - a.t_s for a, b in itertools.pairwise(held)) <= 0.1
+    places = np.array([sp.pos_ned_m for sp in held])
+    assert np.ptp(places, axis=0).max() < 1e-6  # one place, near where the vehicle was then
+    assert np.linalg.norm(places[0] - vehicle.pos_ned_m) < 1e-3
+    assert bench.logs.ticks == ticks
+    vehicle.sends_scans = True
+    bench.run(1.0)
+    assert vehicle.setpoints[-1].pos_ned_m[0] == 100.0
+    assert vehicle.texts[-1] == "swiftnav: scan is back, going on"
+    assert len(vehicle.texts) == 2
+    assert {"scan lost, holding", "scan is back, going on"} <= {row.get("text") for row in bench.rows(EVENTS)}
+
+
+def test_without_scans_on_the_ground_nothing_is_streamed_and_the_user_is_told_once(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.vehicle.sends_scans = False
+    bench.run(20.0)
+    assert bench.vehicle.setpoints == []
+    assert [text for text in bench.said if "no scan" in text] == [
+        "no scan for 5 s: is the LiDAR running, and on the vehicle's clock?"
+    ]
+
+
+def test_a_vehicle_disarmed_while_the_scan_is_lost_ends_the_run(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(1.0)
+    bench.vehicle.sends_scans = False
+    bench.run(1.0)
+    bench.vehicle.armed = False
+    bench.run(1.0)
+    assert bench.companion.exit_code == 0
+
+
+@pytest.mark.parametrize("nonsense", ["raises", "nan"])
+def test_a_tick_that_fails_in_flight_ends_in_a_hold_until_the_pilot_takes_over(tmp_path: Path, nonsense: str) -> None:
+    bench = Bench(tmp_path, brain=HoldNavigator((100.0, 0.0, -3.0)))
+    vehicle, brain = bench.vehicle, bench.brain
+    vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(2.0)
+    if nonsense == "raises":
+        brain.fail = lambda _t_s: True
+    else:
+        brain.place = np.array([np.nan, 0.0, -3.0])
+    bench.run(STEP_S * 2)
+    place, count, ticks = vehicle.pos_ned_m, len(vehicle.setpoints), len(brain.ticks)
+    bench.run(3.0)
+    assert vehicle.texts == ["swiftnav: navigator failed, holding"]
+    assert len(vehicle.setpoints) - count >= 74  # every scan is answered still
+    assert np.linalg.norm(vehicle.pos_ned_m - place) < 0.2
+    assert len(brain.ticks) == ticks  # a navigator that failed is not asked again
+    failed = next(row for row in bench.rows(EVENTS) if row["event"] == "navigator failed")
+    assert ("ZeroDivisionError" if nonsense == "raises" else "ValueError") in failed["exception"]
+    vehicle.custom_mode = 196608  # POSCTL: the pilot
+    bench.run(0.2)
+    assert bench.companion.exit_code == 5
+
+
+def test_a_tick_that_fails_on_the_ground_ends_the_run_at_once(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.brain.fail = lambda _t_s: True
+    bench.run(1.0)
+    assert bench.companion.exit_code == 5
+    assert bench.said[-1] == "navigator failed before the flight: ZeroDivisionError: a bug of ours"
+    assert bench.vehicle.setpoints == []
+
+
+@pytest.mark.parametrize(("signal_number", "exit_code"), [(2, 130), (15, 143)])
+def test_asked_to_stop_in_flight_it_holds_and_hands_the_vehicle_back(
+    tmp_path: Path, signal_number: int, exit_code: int
+) -> None:
+    bench = Bench(tmp_path, brain=HoldNavigator((100.0, 0.0, -3.0)))
+    vehicle = bench.vehicle
+    vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(2.0)
+    bench.stop.set(signal_number)
+    bench.run(1.0)
+    assert (bench.companion.exit_code, bench.companion.reason) == (exit_code, "stopped, the autopilot holds")
+    assert vehicle.custom_mode == codec.PX4_HOLD
+    assert "swiftnav: stopping, holding" in vehicle.texts
+
+
+def test_an_autopilot_that_does_not_take_over_is_held_for_two_seconds_then_left(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, brain=HoldNavigator((100.0, 0.0, -3.0)))
+    vehicle = bench.vehicle
+    vehicle.obeys_modes = False
+    vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(2.0)
+    bench.stop.set(2)
+    count = len(vehicle.setpoints)
+    bench.run(1.9)
+    assert bench.companion.exit_code is None
+    assert len(vehicle.setpoints) - count >= 45
+    assert vehicle.setpoints[-1].pos_ned_m[0] < 50.0
+    bench.run(0.4)
+    assert bench.companion.exit_code == 130
+    assert vehicle.mode_requests == [codec.PX4_HOLD, codec.PX4_HOLD]
+
+
+def test_asked_to_stop_on_the_ground_it_stops(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.run(1.0)
+    bench.stop.set(15)
+    bench.run(0.1)
+    assert (bench.companion.exit_code, bench.companion.reason) == (143, "stopped")
+    assert bench.vehicle.mode_requests == []
+
+
+def test_told_to_engage_it_asks_for_offboard_from_a_hold_in_the_air(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, engage=Engage.AUTO)
+    vehicle = bench.vehicle
+    vehicle.landed, vehicle.armed = LandedState.ON_GROUND, False
+    bench.run(2.0)
+    vehicle.armed = True
+    bench.run(2.0)
+    vehicle.landed, vehicle.custom_mode = LandedState.TAKEOFF, 33816576  # AUTO.TAKEOFF
+    bench.run(2.0)
+    vehicle.landed, vehicle.custom_mode = LandedState.IN_AIR, 196608  # the pilot flies POSCTL
+    bench.run(2.0)
+    assert vehicle.mode_requests == []
+    vehicle.custom_mode = codec.PX4_HOLD
+    bench.run(1.0)
+    assert vehicle.mode_requests == [codec.PX4_OFFBOARD]
+    assert vehicle.offboard
+
+
+def test_a_refused_offboard_is_asked_for_again_once_a_second(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, engage=Engage.AUTO)
+    bench.vehicle.obeys_modes = False
+    bench.run(5.5)
+    assert 5 <= len(bench.vehicle.mode_requests) <= 6
+
+
+def test_a_pilot_who_takes_the_vehicle_back_keeps_it(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, engage=Engage.AUTO)
+    bench.run(2.0)
+    assert bench.vehicle.offboard
+    bench.vehicle.custom_mode = codec.PX4_HOLD
+    bench.run(5.0)
+    assert bench.vehicle.mode_requests == [codec.PX4_OFFBOARD]
+    np.testing.assert_array_equal(bench.vehicle.setpoints[-1].pos_ned_m, bench.vehicle.pos_ned_m)
+
+
+def test_a_lidar_on_its_own_connection_makes_the_same_flight(tmp_path: Path) -> None:
+    records = []
+    for own_lidar in (False, True):
+        bench = Bench(tmp_path / str(own_lidar), brain=navigator, own_lidar=own_lidar)
+        bench.vehicle.custom_mode = codec.PX4_OFFBOARD
+        bench.run(60.0)
+        assert bench.companion.exit_code == 0
+        bench.logs.close()
+        records.append((tmp_path / str(own_lidar) / "log" / RECORDS).read_bytes())
+    assert records[0] == records[1]
+
+
+def test_a_bad_radio_does_not_keep_it_from_landing(tmp_path: Path) -> None:
+    loss = Loss(loss=0.1, duplicate=0.05, delay_s=0.01, jitter_s=0.05)
+    bench = Bench(tmp_path, brain=navigator, loss=loss)
+    bench.run(2.0)
+    bench.vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(90.0)
+    assert bench.companion.exit_code == 0
+    assert np.linalg.norm(bench.vehicle.pos_ned_m[:2] - TASK.goal_ned_m) < 0.5
+
+
+def test_garbage_on_the_link_costs_nothing(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        bench.vehicle.link.transport.send(rng.integers(0, 256, int(rng.integers(1, 80))).astype(np.uint8).tobytes())
+        bench.vehicle.link.transport.send(b"\xfd\xff\x00")
+        bench.run(STEP_S)
+    assert len(bench.brain.ticks) == 50
+
+
+def test_a_status_line_comes_five_times_a_second_and_reads_well(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, brain=navigator)
+    lines: list[Any] = []
+    bench.companion.on_status = lines.append
+    bench.run(4.0)
+    assert 14 <= len(lines) <= 21
+    assert lines[-1].mode == "standby"
+    assert "standby" in str(lines[-1])
+    assert "goal  8.25 m" in str(lines[-1])
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")  # noqa: PTH110
+def test_a_disk_that_fills_up_ends_the_logs_and_not_the_flight(tmp_path: Path) -> None:
+    (tmp_path / "log").mkdir()
+    (tmp_path / "log" / RECORDS).symlink_to("/dev/full")
+    bench = Bench(tmp_path)
+    bench.run(5.0)
+    assert len(bench.vehicle.setpoints) == bench.vehicle.k
+    bench.logs.close()
+    assert bench.logs.problem is not None
+    assert "No space left" in bench.logs.problem
