@@ -32,7 +32,7 @@ def local_ned(message: Message, yaw_rad: float) -> TrajectorySetpoint:
     yaw = m.yaw if not mask & MASK_YAW else math.nan
     if m.coordinate_frame == mav.MAV_FRAME_BODY_NED:
         pos, vel, acc = no_axes(), _turned(vel, yaw_rad), _turned(acc, yaw_rad)
-        yaw += yaw_rad
+        yaw = wrap_rad(yaw + yaw_rad) if math.isfinite(yaw) else math.nan
     elif m.coordinate_frame != mav.MAV_FRAME_LOCAL_NED:
         raise SetpointError(f"SET_POSITION_TARGET_LOCAL_NED coordinate frame {m.coordinate_frame} unsupported")
     if mask & MASK_FORCE and mask & _ALL_ACC != _ALL_ACC:
@@ -43,7 +43,7 @@ def local_ned(message: Message, yaw_rad: float) -> TrajectorySetpoint:
         pos,
         vel,
         acc,
-        wrap_rad(yaw) if math.isfinite(yaw) else math.nan,
+        yaw if math.isfinite(yaw) else math.nan,
         m.yaw_rate if not mask & MASK_YAW_RATE and math.isfinite(m.yaw_rate) else math.nan,
     )
 
