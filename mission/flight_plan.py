@@ -23,6 +23,7 @@ from sitl.world import World
 
 SPAWN_CLEARANCE_M = 0.5  # beyond the radius: take-off in wind drifts
 SPAWN_TRIES = 1000
+DECIMALS = 6  # of the goal [m]: exact as text on the companion's command line
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,8 @@ def plan_mission(mission: Mission, seed: int, overrides: dict[str, dict[str, Any
     params = mission_params(mission, overrides)
     surroundings = load_world(mission.world, mission.start, mission.goal, params.vehicle.radius_m)
     draws = draw(mission, surroundings, seed, params.vehicle.radius_m)
-    goal_ned_m: F64 = surroundings.goal_ned_m - np.array(draws.spawn_ned_m)
+    offset_ned_m = (surroundings.goal_ned_m - np.array(draws.spawn_ned_m)).tolist()
+    goal_ned_m: F64 = np.array([round(metres, DECIMALS) for metres in offset_ned_m])
     task = Task(goal_ned_m, mission.down_m, mission.cruise_m_s)
     return FlightPlan(mission, surroundings.seeded(draws.mover_seed), params, seed, draws, task)
 

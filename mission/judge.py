@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from companion.core.types import F64, LandedState
-from mission.flight_log import TruthLog, read_navigator, read_rows, read_truth
+from companion.navigator.record import STANDBY
+from mission.flight_log import NavigatorLog, TruthLog, read_navigator, read_rows, read_truth
 from mission.flight_plan import FlightPlan
 from mission.shortest_path import shortest_path_m
 
@@ -82,7 +83,7 @@ def judge(plan: FlightPlan, folder: Path, trouble: str | None) -> Result:
         landed=flown.landed,
         landing_error_m=flown.landing_error_m,
         rl_decisions=nav.rl_decisions,
-        **read_timing(folder / "timing.jsonl"),
+        **read_timing(folder / "timing.jsonl", nav),
         log_dir=str(folder),
         seed=plan.seed,
         world=plan.world.name,
@@ -127,15 +128,15 @@ def failure_of(flown: Flown, plan: FlightPlan, shortest_m: float | None, trouble
     return None if flown.time_s <= limit_s else f"took {flown.time_s:.1f} s, allowed are {limit_s:.1f} s"
 
 
-def read_timing(path: Path) -> dict[str, float | None]:
-    """Wall-clock figures of the companion's ticks, None without ticks in OFFBOARD."""
-    rows = list(read_rows(path))
-    ticks_ms = np.array([row["tick_ms"] for row in rows], dtype=np.float64)
-    if not len(ticks_ms):
+def read_timing(path: Path, nav: NavigatorLog) -> dict[str, float | None]:
+    """Wall-clock figures of the companion's ticks in OFFBOARD; None without any."""
+    steered = {t_s for t_s, mode in zip(nav.t_s.tolist(), nav.mode, strict=True) if mode != STANDBY}
+    rows = [row for row in read_rows(path) if row["t_s"] in steered]
+    if len(rows) < 2:
         return {"tick_p50_ms": None, "tick_p99_ms": None, "realtime_factor": None}
-    wall_s = rows[-1]["wall_s"] - rows[0]["wall_s"]
-    factor = (rows[-1]["t_s"] - rows[0]["t_s"]) / wall_s if wall_s > 0.0 else None
-    p50, p99 = np.percentile(ticks_ms, [50, 99])
+    p50, p99 = np.percentile([row["tick_ms"] for row in rows], [50, 99])
+    wall_s = max(rows[-1]["wall_s"] - rows[0]["wall_s"], 1e-9)
+    factor = (rows[-1]["t_s"] - rows[0]["t_s"]) / wall_s
     return {"tick_p50_ms": float(p50), "tick_p99_ms": float(p99), "realtime_factor": factor}
 
 

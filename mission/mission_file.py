@@ -15,6 +15,7 @@ from mission.plan_file import read_plan
 from mission.strict_yaml import StrictModel, checked, read_yaml
 
 Real = Annotated[float, Strict()]
+TIME_LIMIT_MAX_S = 3600.0
 Turbulence = Literal["none", "light", "moderate", "severe"]
 
 
@@ -42,7 +43,9 @@ class NoiseSpec(StrictModel):
 class Success(StrictModel):
     """What the judge asks for, beside no contact at all."""
 
-    time_limit_s: Real = Field(gt=0.0, le=3600.0)  # vehicle time, from the first tick in OFFBOARD to touchdown
+    time_limit_s: Real = Field(
+        gt=0.0, le=TIME_LIMIT_MAX_S
+    )  # vehicle time, from the first tick in OFFBOARD to touchdown
     time_ratio: Real | None = Field(default=None, ge=1.0, le=100.0)  # the same time, over the shortest way at cruise
     landing_error_m: Real = Field(default=0.5, gt=0.0, le=100.0)  # horizontal, touchdown to goal
 
@@ -110,6 +113,6 @@ def _from_plan(path: Path) -> Mission:
         "goal": plan.goal_ned_m,
         "down_m": plan.down_m,
         "cruise_m_s": plan.speed_m_s,
-        "success": {"time_limit_s": plan.time_limit_s},
+        "success": {"time_limit_s": min(plan.time_limit_s, TIME_LIMIT_MAX_S)},
     }
     return checked(Mission, data, str(path))

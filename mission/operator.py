@@ -48,7 +48,7 @@ class OperatorConfig:
     command_wall_s: float = 10.0
     takeoff_wall_s: float = 60.0
     offboard_wall_s: float = 20.0
-    silence_wall_s: float = 10.0  # without LOCAL_POSITION_NED: the vehicle is lost
+    stuck_wall_s: float = 10.0  # without vehicle time going on
 
 
 async def fly(config: OperatorConfig, say: Say) -> None:
@@ -103,14 +103,16 @@ async def _hand_over(config: OperatorConfig, watch: TelemetryWatch, direct: Mavl
 
 async def _watch(config: OperatorConfig, watch: TelemetryWatch, say: Say) -> None:
     """Until disarmed on the ground, or until something is wrong."""
-    start_s = watch.t_s
+    start_s, began_wall_s = watch.t_s, time.monotonic()
     while True:
         await watch.until(lambda: not watch.armed, 0.5)
         if not watch.armed:
             say("disarmed")
             return
-        if not watch.connected or time.monotonic() - watch.heard_wall_s > config.silence_wall_s:
+        if not watch.connected:
             raise OperatorError("the vehicle was lost in flight")
+        if time.monotonic() - max(watch.moved_wall_s, began_wall_s) > config.stuck_wall_s:
+            raise OperatorError(f"vehicle time stood still for {config.stuck_wall_s:g} s")
         if watch.mode not in ("OFFBOARD", "LAND", "UNKNOWN"):
             raise OperatorError(f"the vehicle left OFFBOARD for {watch.mode}")
         if watch.t_s - start_s > config.time_limit_s:

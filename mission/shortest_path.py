@@ -1,7 +1,7 @@
 """How long is the shortest way for the vehicle?  The length that flown paths are compared with; pure, world ned.
 
-Dijkstra on a grid of exact clearances, then every stretch that a straight line can replace is replaced. Movers do not
-count. What comes out is flyable, so it is never shorter than the truth; beside one round obstacle it was 0.03 % longer.
+Dijkstra on a grid of exact clearances, then every stretch that a straight line can replace is replaced, then the rest
+is pulled tight. Movers do not count. Round single discs the length was within 0.04 % of two tangents and an arc.
 """
 
 import dataclasses
@@ -19,6 +19,7 @@ from sitl.world import World
 NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1))  # and their opposites
 RESAMPLE_M = 0.5  # vertices of the second pass of straightening: corners become tangents
 PASSES = 3
+PULLS = 600
 REACH_M = 30.0  # beside half the distance: how far round a way may lead
 
 
@@ -46,7 +47,7 @@ def shortest_path(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float)
     path = np.concatenate([ends[:1], origin + steps[1:-1] * cell_m, ends[1:]])
     for _ in range(PASSES):
         path = grid.straightened(_resampled(path))
-    return grid.straightened(path)
+    return grid.tightened(_resampled(path))
 
 
 class _Grid:
@@ -69,14 +70,41 @@ class _Grid:
             kept.append(next((k for k in ahead if self._free(path[here], path[k])), here + 1))
         return path[kept]
 
+    def tightened(self, path: F64) -> F64:
+        """A string pulled tight: every vertex to between its neighbours, then out of what it went into."""
+        path = path.copy()
+        for _ in range(PULLS):
+            path[1:-1] = (path[:-2] + path[2:]) / 2.0
+            inside_m = self._radius_m - self._clearance(path[1:-1])
+            if np.any(inside_m > 0.0):
+                path[1:-1] += np.maximum(inside_m, 0.0)[:, None] * self._outward(path[1:-1])
+        return path
+
+    def _outward(self, points: F64) -> F64:
+        """Unit vectors (n, 2) of growing clearance; zero where it is flat."""
+        step = self._cell_m / 2.0
+        slope = np.stack(
+            [self._clearance(points + d) - self._clearance(points - d) for d in step * np.eye(2)],
+            axis=1,
+        )
+        length = np.hypot(*slope.T)[:, None]
+        unit: F64 = np.divide(slope, length, out=np.zeros_like(slope), where=length > 0.0)
+        return unit
+
     def _free(self, a: F64, b: F64) -> bool:
         count = max(2, math.ceil(math.dist(a, b) / self._cell_m) + 1)
-        points = (a + np.linspace(0.0, 1.0, count)[1:-1, None] * (b - a) - self._origin) / self._cell_m
-        cell = np.clip(points.astype(np.intp), 0, np.array(self._field.shape) - 2)
-        (i, j), (u, v) = cell.T, (points - cell).T
+        points = a + np.linspace(0.0, 1.0, count)[1:-1, None] * (b - a)
+        return bool(np.all(self._clearance(points) >= self._radius_m))
+
+    def _clearance(self, points: F64) -> F64:
+        """Bilinear, (n,)."""
+        at = (points - self._origin) / self._cell_m
+        cell = np.clip(at.astype(np.intp), 0, np.array(self._field.shape) - 2)
+        (i, j), (u, v) = cell.T, np.clip(at - cell, 0.0, 1.0).T
         lower = self._field[i, j] * (1 - v) + self._field[i, j + 1] * v
         upper = self._field[i + 1, j] * (1 - v) + self._field[i + 1, j + 1] * v
-        return bool(np.all(lower * (1 - u) + upper * u >= self._radius_m))
+        along: F64 = lower * (1 - u) + upper * u
+        return along
 
 
 def _straight(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> bool:

@@ -23,7 +23,7 @@ class TelemetryWatch:
         self.mode = "UNKNOWN"
         self.landed = "UNKNOWN"
         self.t_s = 0.0  # vehicle time of the last LOCAL_POSITION_NED
-        self.heard_wall_s = time.monotonic()
+        self.moved_wall_s = time.monotonic()  # when vehicle time last went on
         self.texts: list[str] = []
         self._system = system
         self._say = say
@@ -97,5 +97,7 @@ class TelemetryWatch:
         self._say(f"vehicle: {status.text}")
 
     def _on_position(self, message: Any) -> None:
-        self.t_s = float(json.loads(message.fields_json)["time_boot_ms"]) / 1000.0
-        self.heard_wall_s = time.monotonic()
+        t_s = float(json.loads(message.fields_json)["time_boot_ms"]) / 1000.0
+        if t_s != self.t_s:
+            self.t_s = t_s
+            self.moved_wall_s = time.monotonic()

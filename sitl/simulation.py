@@ -83,6 +83,7 @@ class Simulation:
         self._mover_m_s = max((m.speed_m_s for m in world.movers), default=0.0)
         self._check_step = 0  # when contact has to be looked at again
         self._clearance_m = math.inf  # smallest since the last row
+        self._closed = False  # no more rows
         self._sense()
         self._check_contact()
 
@@ -192,7 +193,8 @@ class Simulation:
         self._check_scan_instant()
         scan = self._lidar.scan(self.t_s, self.truth.pos_ned_m + self.spawn_ned_m, self.truth.q_ned_frd)
         self.scan = quantise_scan(scan)
-        if not self.finished:
+        if not self._closed:
+            self._closed = self.finished  # the last row shows the vehicle disarmed
             self.rows.append(
                 TruthRow(self.t_ms, self.truth, self._clearance_m, self.contact, ap.mode, ap.armed, ap.landed_state)
             )

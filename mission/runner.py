@@ -1,0 +1,147 @@
+"""How is one flight made?  Vehicle and companion as processes, the operator here, the judge at the end.
+
+All ports are PX4's plus the instance. Whatever happens the processes are ended: companion first, the vehicle last, so
+that an interrupted flight leaves a vehicle that holds and logs that are closed.
+"""
+
+import asyncio
+import json
+import signal
+import socket
+import threading
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from mission import operator
+from mission.console import FlightConsole
+from mission.errors import FlightError, InputError
+from mission.flight_folder import write_inputs, write_result
+from mission.flight_plan import DECIMALS, FlightPlan
+from mission.judge import Result, judge
+from mission.processes import Child, Children, wait_for_end
+from mission.simulate import sim_config
+from sitl.link import SPECS
+from sitl.server import RunConfig
+from sitl.vehicle_config import VehicleConfig
+
+REFRESH_WALL_S = 0.1
+AFTERWARDS_WALL_S = 5.0  # that the companion has to notice that the flight is over
+COMPANION_PORT = 14540  # PX4's API port
+OPERATOR_PORT = 14030  # PX4's payload port
+
+
+@dataclass(frozen=True, slots=True)
+class FlySettings:
+    """How to fly, not what."""
+
+    speed: float = float("inf")  # times real time
+    lockstep: bool = True
+    instance: int = 0
+    operator_url: str | None = None
+
+    @property
+    def run_config(self) -> RunConfig:
+        """Vehicle time stops for commands where it does not follow the clients' clocks."""
+        return RunConfig(self.speed, self.lockstep, gates=self.lockstep or self.speed > 1.0)
+
+
+def check_ports(instance: int) -> None:
+    """Raise InputError naming the first port that somebody else holds."""
+    ports = {spec.local_port: f"vehicle's {spec.name} link" for spec in SPECS}
+    ports |= {spec.remote_port: spec.name for spec in SPECS if spec.name != "gcs"}
+    for port, user in ports.items():
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("0.0.0.0", port + instance))
+            except OSError as error:
+                raise InputError(
+                    f"port {port + instance} ({user}) is in use: end the other flight or choose --instance N"
+                ) from error
+
+
+def fly(plan: FlightPlan, settings: FlySettings, folder: Path, console: FlightConsole) -> Result:
+    """Fly, judge, write everything into ``folder``. KeyboardInterrupt passes on after result.json was written."""
+    write_inputs(plan, folder, asdict(settings) | {"speed": str(settings.speed)})
+    trouble: str | None = None
+    try:
+        with Children() as children:
+            asyncio.run(_fly(plan, settings, folder, console, children))
+    except FlightError as error:
+        trouble = str(error)
+    except KeyboardInterrupt:
+        _finish(plan, folder, "interrupted")
+        raise
+    return _finish(plan, folder, trouble)
+
+
+async def _fly(
+    plan: FlightPlan, settings: FlySettings, folder: Path, console: FlightConsole, children: Children
+) -> None:
+    """Both processes and the operator, until the operator is done or something ends before its time."""
+    _end_on_sigterm_too()
+    companion = children.start(
+        "companion", "companion", companion_arguments(plan, settings, folder), folder / "companion.log"
+    )
+    vehicle = children.start("vehicle", "sitl", [str(_write_vehicle(plan, settings, folder))], folder / "vehicle.log")
+    url = settings.operator_url or f"udpin://0.0.0.0:{OPERATOR_PORT + settings.instance}"
+    config = operator.OperatorConfig(url, plan.mission.success.time_limit_s)
+    flight = asyncio.create_task(operator.fly(config, console.say))
+    try:
+        while not flight.done():
+            await asyncio.wait({flight}, timeout=REFRESH_WALL_S)
+            console.refresh()
+            _check_running(companion, vehicle)
+        await flight
+    finally:
+        flight.cancel()
+        await asyncio.gather(flight, return_exceptions=True)
+    await asyncio.to_thread(wait_for_end, companion, AFTERWARDS_WALL_S)
+    console.refresh()
+
+
+def companion_arguments(plan: FlightPlan, settings: FlySettings, folder: Path) -> list[str]:
+    """What would be typed after ``python -m companion`` on the drone."""
+    goal = [f"{metres:.{DECIMALS}f}" for metres in plan.task.goal_ned_m.tolist()]
+    if plan.task.down_m is not None:
+        goal.append(repr(plan.task.down_m))
+    return [
+        *("--vehicle", f"udpin://0.0.0.0:{COMPANION_PORT + settings.instance}"),
+        *("--goal", *goal),
+        *("--cruise", repr(plan.task.cruise_m_s)),
+        *("--params", str(folder / "params.yaml")),
+        *("--log", str(folder)),
+        *("--seed", str(plan.seed)),
+    ]
+
+
+def vehicle_config(plan: FlightPlan, settings: FlySettings, folder: Path | None) -> VehicleConfig:
+    """What the vehicle's process is told."""
+    return VehicleConfig(plan.world, sim_config(plan), settings.run_config, settings.instance, log_dir=folder)
+
+
+def _write_vehicle(plan: FlightPlan, settings: FlySettings, folder: Path) -> Path:
+    path = folder / "vehicle.json"
+    path.write_text(json.dumps(vehicle_config(plan, settings, folder).to_json()), encoding="utf-8")
+    return path
+
+
+def _check_running(companion: Child, vehicle: Child) -> None:
+    """Raise FlightError when the vehicle has ended, or the companion other than by landing."""
+    for child, fine in ((vehicle, None), (companion, 0)):
+        if child.exit_code not in (None, fine):
+            raise FlightError(f"the {child.name} ended: {child.last_line() or f'exit code {child.exit_code}'}")
+
+
+def _end_on_sigterm_too() -> None:
+    """SIGTERM ends the flight as Ctrl-C does; asyncio has just put its own handler there."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
+
+
+def _finish(plan: FlightPlan, folder: Path, trouble: str | None) -> Result:
+    from mission.figures import draw_flight  # matplotlib: loaded while nothing flies
+
+    result = judge(plan, folder, trouble)
+    write_result(result, folder)
+    draw_flight(plan, folder, result)
+    return result
