@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,11 +11,12 @@ import typer
 from mission.errors import InputError
 
 EXTRA_MODULES = {"sitl": ("jsbsim", "mavsdk", "numba", "matplotlib")}  # as pyproject.toml lists them
+SPEED_MIN, SPEED_MAX = 0.1, 100.0
 INSTANCE_MAX = 9  # PX4's ports of instance 10 run into the next range
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Draws wind, start, noise and movers.")]
-Speed = Annotated[str, typer.Option("--speed", help="Times real time (1, 20, ...), or 'max' = lockstep.")]
+Speed = Annotated[str, typer.Option("--speed", help="Times real time (1, 5, ...), or 'max': lockstep, unpaced.")]
 Lockstep = Annotated[bool, typer.Option("--lockstep", help="The vehicle waits for the answer to each scan.")]
 Instance = Annotated[int, typer.Option("--instance", min=0, max=INSTANCE_MAX, help="Added to every port.")]
 ParamSet = Annotated[
@@ -29,17 +31,17 @@ def require_extra(extra: str, command: str) -> None:
         raise InputError(f"swiftnav {command} needs the '{extra}' extra: pip install 'swiftnav[{extra}]'")
 
 
-def parse_speed(text: str, lockstep: bool) -> float | None:
-    """Factor over real time; None = lockstep. Raises InputError."""
-    if text == "max" or lockstep:
-        return None
+def parse_speed(text: str, lockstep: bool) -> tuple[float, bool]:
+    """Factor over real time (inf: unpaced), and whether in lockstep. Raises InputError."""
+    if text == "max":
+        return math.inf, True
     try:
         speed = float(text)
     except ValueError:
-        speed = float("nan")
-    if not 0.1 <= speed <= 100.0:
-        raise InputError(f"--speed '{text}' wants a number in [0.1, 100] or 'max'")
-    return speed
+        speed = math.nan
+    if not SPEED_MIN <= speed <= SPEED_MAX:
+        raise InputError(f"--speed '{text}' wants a number in [{SPEED_MIN:g}, {SPEED_MAX:g}] or 'max'")
+    return speed, lockstep
 
 
 def parse_overrides(file: Path | None, settings: list[str] | None) -> dict[str, dict[str, Any]]:

@@ -44,7 +44,7 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(int(ExitCode.BAD_INPUT), f"{self.prog}: {message} (try --help)\n")
 
 
-def parser(prog: str = "python -m companion") -> argparse.ArgumentParser:
+def parser(prog: str = "python -m companion", goal_required: bool = True) -> argparse.ArgumentParser:
     """The options."""
     options = OneLineParser(
         prog=prog,
@@ -55,7 +55,8 @@ def parser(prog: str = "python -m companion") -> argparse.ArgumentParser:
     add = options.add_argument
     add("--vehicle", metavar="URL", help=f"the autopilot, as MAVSDK writes it (default: {VEHICLE_URL})")
     add("--lidar", metavar="URL", help="where OBSTACLE_DISTANCE comes from (default: the vehicle's link)")
-    add("--goal", metavar="M", type=_number, nargs="+", required=True, help="NORTH EAST [DOWN] from where it booted")
+    goal_help = "NORTH EAST [DOWN] from where it booted"
+    add("--goal", metavar="M", type=_number, nargs="+", required=goal_required, help=goal_help)
     add("--cruise", metavar="M_S", type=_number, default=CRUISE_M_S, help="cap of the speed (default: %(default)s)")
     add("--params", metavar="FILE", type=Path, help="YAML of {group: {field: value}}")
     add("--log", metavar="DIR", type=Path, help="log folder (default: flights/<UTC>_companion)")
@@ -76,6 +77,11 @@ def main(arguments: list[str] | None = None, prog: str = "python -m companion") 
     except (InputError, ParamError) as error:
         print(error, file=sys.stderr)
         return int(ExitCode.BAD_INPUT)
+    return launch(config, given)
+
+
+def launch(config: CompanionConfig, given: argparse.Namespace) -> int:
+    """Fly and print what was asked for; the exit code."""
     summary = fly(config, on_status=print_status if given.status else None)
     if given.json:
         print(json.dumps(dataclasses.asdict(summary)))

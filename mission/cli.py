@@ -1,0 +1,69 @@
+"""What can a person type?  The console script ``swiftnav``: parses, hands over, turns every mistake into one line.
+
+Importing this module must stay quick: each command imports what it needs when it runs.
+"""
+
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from companion.core.params import ParamError
+from mission.cli_bench import app as bench_app
+from mission.cli_fly import fly
+from mission.cli_params import app as params_app
+from mission.cli_sitl import sitl
+from mission.cli_worlds import app as worlds_app
+from mission.errors import FlightError, InputError
+
+PROG = "swiftnav"
+EXIT_FAILED = 1
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+
+app = typer.Typer(
+    help="SWIFT-Nav: a companion app that flies PX4-class vehicles through clutter, and a vehicle to fly it against.",
+    epilog="Example: swiftnav fly trajectory2 --seed 1",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command(epilog="Example: swiftnav fly trajectory2 --seed 7 --json")(fly)
+app.command(epilog="Example: swiftnav sitl --world trajectory1 --speed 1")(sitl)
+app.add_typer(worlds_app, name="worlds")
+app.add_typer(params_app, name="params")
+app.add_typer(bench_app, name="bench")
+
+
+@app.command(
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []},
+    epilog="Example: swiftnav companion --goal 55 0 -3",
+)
+def companion() -> None:
+    """The app alone, as on the drone: the same door as 'python -m companion'."""
+    raise AssertionError("main() takes this command before typer does")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code; one line on stderr for whatever went wrong."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        if given[:1] == ["companion"]:
+            from mission.cli_companion import companion as run_companion
+
+            return run_companion(given[1:])
+        code = app(given, prog_name=PROG, standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except typer.TyperException as error:
+        return _complain(error.format_message(), EXIT_BAD_INPUT)
+    except (InputError, ParamError) as error:
+        return _complain(str(error), EXIT_BAD_INPUT)
+    except FlightError as error:
+        return _complain(str(error), EXIT_FAILED)
+    except KeyboardInterrupt:
+        return _complain("interrupted", EXIT_INTERRUPTED)
+
+
+def _complain(text: str, code: int) -> int:
+    print(f"{PROG}: {' '.join(text.split())}", file=sys.stderr)
+    return code

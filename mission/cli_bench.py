@@ -1,0 +1,26 @@
+"""``swiftnav bench``: how quick is it on this machine?"""
+
+import typer
+
+from mission.cli_options import Json, Seed, print_json, require_extra
+
+app = typer.Typer(help="Measurements.", no_args_is_help=True)
+
+
+@app.callback()
+def bench() -> None:
+    """Measurements; each prints the machine it ran on."""
+
+
+@app.command(epilog="Example: swiftnav bench speed --json")
+def speed(seed: Seed = 1, json: Json = False) -> None:
+    """Ratios to bare JSBSim stepping, the closed loop over UDP, the ticks, the companion's memory."""
+    require_extra("sitl", "bench speed")
+    from mission.bench_speed import measure
+
+    figures = measure(seed)
+    if json:
+        print_json(figures)
+        return
+    for name, value in figures.items():
+        typer.echo(f"{name:22} {value:.3g}" if isinstance(value, float) else f"{name:22} {value}")

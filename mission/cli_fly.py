@@ -1,0 +1,65 @@
+"""``swiftnav fly``: one command, one flight. Vehicle, companion and operator; judged; exit 0 only on success."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mission.cli_options import (
+    Instance,
+    Json,
+    Lockstep,
+    ParamFile,
+    ParamSet,
+    Seed,
+    Speed,
+    parse_overrides,
+    parse_speed,
+    print_json,
+    require_extra,
+)
+
+DEFAULT_MISSION = "trajectory2"
+
+World = Annotated[str | None, typer.Option(help="Fly in this world (a name or a YAML file) instead of the mission's.")]
+Policy = Annotated[str | None, typer.Option(help="Who proposes waypoints in RL mode, instead of the mission's.")]
+OperatorUrl = Annotated[str | None, typer.Option(help="Link of the operator, instead of udpin port 14030.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Flight folder, new or empty; default below ./flights.")]
+MissionName = Annotated[str, typer.Argument(help="A mission's name, a YAML file, or a QGroundControl .plan.")]
+
+
+def fly(
+    mission: MissionName = DEFAULT_MISSION,
+    seed: Seed = 0,
+    speed: Speed = "max",
+    lockstep: Lockstep = False,
+    world: World = None,
+    policy: Policy = None,
+    param: ParamSet = None,
+    params: ParamFile = None,
+    instance: Instance = 0,
+    operator_url: OperatorUrl = None,
+    out: Out = None,
+    json: Json = False,
+) -> int:
+    """Fly a mission over MAVLink, judge it, leave a flight folder. Exit code 0 only on success."""
+    require_extra("sitl", "fly")
+    from mission.console import FlightConsole, LogTail, print_result
+    from mission.flight_folder import make_folder
+    from mission.flight_plan import plan_flight
+    from mission.runner import FlySettings, check_ports
+    from mission.runner import fly as run
+
+    times, in_step = parse_speed(speed, lockstep)
+    settings = FlySettings(times, in_step, instance, operator_url)
+    plan = plan_flight(mission, seed, parse_overrides(params, param), world, policy)
+    check_ports(instance)
+    folder = make_folder(plan, out)
+    title = f"{plan.mission.name}, seed {seed}, {plan.mission.policy}"
+    with FlightConsole(title, LogTail(folder / "navigator.jsonl"), quiet=json) as console:
+        result = run(plan, settings, folder, console)
+    if json:
+        print_json(result.as_dict())
+    else:
+        print_result(result)
+    return 0 if result.success else 1

@@ -1,0 +1,68 @@
+"""``swiftnav sitl``: the vehicle alone, on the ports where PX4 would be."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mission.cli_options import Instance, Json, Lockstep, Seed, Speed, parse_speed, print_json, require_extra
+from mission.errors import InputError
+
+if TYPE_CHECKING:
+    from sitl.vehicle import Wind
+
+World = Annotated[str, typer.Option(help="A world's name or a YAML file.")]
+Spawn = Annotated[tuple[float, float] | None, typer.Option(help="North and east in the world, m; default its start.")]
+Yaw = Annotated[float, typer.Option(help="Where the nose points at first, deg clockwise from north.")]
+WindOption = Annotated[tuple[float, float], typer.Option(help="Where the air moves to, north and east, m/s.")]
+Turbulence = Annotated[str, typer.Option(help="none, light, moderate or severe; needs wind to be felt.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder for truth and MAVLink logs; default: no logs.")]
+
+
+def sitl(
+    world: World = "open",
+    seed: Seed = 0,
+    speed: Speed = "1",
+    lockstep: Lockstep = False,
+    spawn: Spawn = None,
+    yaw: Yaw = 0.0,
+    wind: WindOption = (0.0, 0.0),
+    turbulence: Turbulence = "none",
+    instance: Instance = 0,
+    out: Out = None,
+    json: Json = False,
+) -> int:
+    """The vehicle alone, as PX4 would be: companion udp 14540, ground station 14550. Ends with Ctrl-C."""
+    require_extra("sitl", "sitl")
+    from mission.runner import FlySettings
+    from mission.world_file import load_world
+    from sitl.app import run
+    from sitl.simulation import SimConfig
+    from sitl.vehicle_config import VehicleConfig
+
+    times, in_step = parse_speed(speed, lockstep)
+    place = load_world(world, start=spawn)
+    sim = SimConfig(seed, spawn, math.radians(_finite(yaw, "--yaw")), _wind(wind, turbulence))
+    settings = FlySettings(times, in_step, instance)
+    config = VehicleConfig(place.seeded(seed), sim, settings.run_config, instance, log_dir=out)
+    if json:
+        print_json(config.to_json())
+    return run(config)
+
+
+def _wind(towards_m_s: tuple[float, float], turbulence: str) -> "Wind":
+    from companion.core.params import nearest
+    from sitl.vehicle import Turbulence, Wind
+
+    names = [strength.name.lower() for strength in Turbulence]
+    if turbulence not in names:
+        raise InputError(f"--turbulence '{turbulence}' is unknown{nearest(turbulence, names)}")
+    north, east = (_finite(speed, "--wind") for speed in towards_m_s)
+    return Wind((north, east, 0.0), Turbulence[turbulence.upper()])
+
+
+def _finite(value: float, option: str) -> float:
+    if not math.isfinite(value):
+        raise InputError(f"{option} {value} is not a finite number")
+    return value
