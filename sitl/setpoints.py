@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import common as mav
 
 from companion.core.codec import MASK_ACC, MASK_FORCE, MASK_POS, MASK_VEL, MASK_YAW, MASK_YAW_RATE
 from companion.core.frames import wrap_rad
-from companion.core.types import F64
+from companion.core.types import F64, Setpoint
 from sitl.demand import TrajectorySetpoint, no_axes
 
 Message = Any  # a MAVLink_*_message object
@@ -46,6 +46,18 @@ def local_ned(message: Message, yaw_rad: float) -> TrajectorySetpoint:
         yaw if math.isfinite(yaw) else math.nan,
         m.yaw_rate if not mask & MASK_YAW_RATE and math.isfinite(m.yaw_rate) else math.nan,
     )
+
+
+def of_companion(setpoint: Setpoint) -> TrajectorySetpoint:
+    """A companion's setpoint as ``local_ned`` would read it from the wire: float32, yaw rate not given."""
+    yaw_rad = math.nan if setpoint.yaw_rad is None else float(np.float32(setpoint.yaw_rad))
+    return TrajectorySetpoint(
+        _float32(setpoint.pos_ned_m), _float32(setpoint.vel_ned_m_s), _float32(setpoint.acc_ned_m_s2), yaw_rad, math.nan
+    )
+
+
+def _float32(vector: F64 | None) -> F64:
+    return no_axes() if vector is None else vector.astype(np.float32).astype(np.float64)
 
 
 def _axes(values: tuple[float, float, float], mask: int, bits: tuple[int, int, int]) -> F64:

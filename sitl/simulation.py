@@ -14,14 +14,15 @@ from typing import Final
 
 import numpy as np
 
-from companion.core.codec import from_ms, quantise_scan, quantise_setpoint, quantise_state
+from companion.core.codec import from_ms, quantise_scan, quantise_state, to_ms
 from companion.core.types import F64, AutopilotStatus, Scan, Setpoint, VehicleState
 from sitl.autopilot import Autopilot
 from sitl.collision import CollisionChecker
-from sitl.demand import Demand, Loop, TrajectorySetpoint, no_axes
+from sitl.demand import Demand, Loop, TrajectorySetpoint
 from sitl.lidar import Lidar, LidarParams
 from sitl.modes import FlightMode
 from sitl.px4_params import ParamStore
+from sitl.setpoints import of_companion
 from sitl.truth_log import TruthRow
 from sitl.vehicle import Truth, Vehicle, Wind
 from sitl.world import World
@@ -124,8 +125,7 @@ class Simulation:
 
     def submit(self, setpoint: Setpoint) -> None:
         """The companion's answer to a scan; in force one latency after ``setpoint.t_s``."""
-        sent = quantise_setpoint(setpoint)
-        self.submit_trajectory(_trajectory(sent), round(sent.t_s * 1e3))
+        self.submit_trajectory(of_companion(setpoint), to_ms(setpoint.t_s))
 
     def submit_trajectory(self, setpoint: TrajectorySetpoint, scan_ms: int | None) -> None:
         """A setpoint from the wire; ``scan_ms``: time of the scan that it answers, None: in force at once."""
@@ -190,16 +190,15 @@ class Simulation:
 
     def _observe(self) -> Observation:
         ap = self.autopilot
+        mode, landed = ap.mode, ap.landed_state
         self._check_scan_instant()
         scan = self._lidar.scan(self.t_s, self.truth.pos_ned_m + self.spawn_ned_m, self.truth.q_ned_frd)
         self.scan = quantise_scan(scan)
         if not self._closed:
             self._closed = self.finished  # the last row shows the vehicle disarmed
-            self.rows.append(
-                TruthRow(self.t_ms, self.truth, self._clearance_m, self.contact, ap.mode, ap.armed, ap.landed_state)
-            )
+            self.rows.append(TruthRow(self.t_ms, self.truth, self._clearance_m, self.contact, mode, ap.armed, landed))
         self._clearance_m = math.inf
-        status = AutopilotStatus(ap.armed, ap.mode is FlightMode.OFFBOARD, ap.landed_state)
+        status = AutopilotStatus(ap.armed, mode is FlightMode.OFFBOARD, landed)
         return Observation(self.state, status, self.scan)
 
     def _check_scan_instant(self) -> None:
@@ -238,13 +237,3 @@ def _scan_steps(params: LidarParams) -> int:
     if steps < 1 or not math.isclose(steps * STEP_MS / 1e3 * params.rate_hz, 1.0, rel_tol=1e-6):
         raise ValueError(f"LiDAR: {params.rate_hz} Hz is no whole number of {STEP_MS} ms physics steps")
     return steps
-
-
-def _trajectory(setpoint: Setpoint) -> TrajectorySetpoint:
-    return TrajectorySetpoint(
-        no_axes() if setpoint.pos_ned_m is None else setpoint.pos_ned_m,
-        no_axes() if setpoint.vel_ned_m_s is None else setpoint.vel_ned_m_s,
-        no_axes() if setpoint.acc_ned_m_s2 is None else setpoint.acc_ned_m_s2,
-        math.nan if setpoint.yaw_rad is None else setpoint.yaw_rad,
-        math.nan,
-    )

@@ -7,10 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mav
 
-from companion.core.codec import decode_setpoint, encode_setpoint, quantise_setpoint
+from companion.core.codec import decode_setpoint, encode_setpoint
 from companion.core.types import Setpoint
-from sitl.setpoints import SetpointError, local_ned
-from sitl.simulation import _trajectory
+from sitl.setpoints import SetpointError, local_ned, of_companion
 
 NAN = math.nan
 POSITION, VELOCITY, POS_VEL, POS_VEL_ACC, ACCELERATION, BODY = 2552, 2503, 2496, 2048, 3135, 1479  # as MAVSDK sends
@@ -97,7 +96,7 @@ def test_a_setpoint_means_the_same_over_the_wire_and_in_process(pos: Any, vel: A
     link = mav.MAVLink(None, 1, 191)
     wire = mav.MAVLink(None).decode(bytearray(encode_setpoint(sent).pack(link)))
     assert decode_setpoint(wire).t_s == 1.0
-    inside = _trajectory(quantise_setpoint(sent))
+    inside = of_companion(sent)
     try:
         outside = local_ned(wire, 0.0)
     except SetpointError:
