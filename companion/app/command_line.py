@@ -5,6 +5,7 @@ argparse, because a goal has two or three numbers.
 
 import argparse
 import dataclasses
+import gc
 import json
 import math
 import sys
@@ -82,6 +83,8 @@ def main(arguments: list[str] | None = None, prog: str = "python -m companion") 
 
 def launch(config: CompanionConfig, given: argparse.Namespace) -> int:
     """Fly and print what was asked for; the exit code."""
+    gc.collect()
+    gc.freeze()  # what the imports made stays for ever: never walk through it in flight, that takes tens of ms
     summary = fly(config, on_status=print_status if given.status else None)
     if given.json:
         print(json.dumps(dataclasses.asdict(summary)))

@@ -33,14 +33,10 @@ class Assembler:
         self._heartbeat: Message | None = None
         self._extended: Message | None = None
         self._last_scan_s = -math.inf
+        self.status: AutopilotStatus | None = None  # what the autopilot last said of itself
         self.vehicle_system: int | None = None  # system id of the autopilot, once heard
         self.reboots = 0  # times that vehicle time started again
         self.dropped_scans = 0  # unreadable, repeated, late, of another clock, or without a state to go with
-
-    @property
-    def status(self) -> AutopilotStatus | None:
-        """What the autopilot last said of itself; None before its first HEARTBEAT."""
-        return codec.decode_status(self._heartbeat, self._extended) if self._heartbeat is not None else None
 
     @property
     def custom_mode(self) -> int | None:
@@ -79,6 +75,7 @@ class Assembler:
             self._take_attitude(message)
         elif kind == mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE:
             self._extended = message
+            self._judge_status()
         return None
 
     def _take_heartbeat(self, message: Message) -> None:
@@ -88,26 +85,32 @@ class Assembler:
             self.vehicle_system = message.get_srcSystem()
         if message.get_srcSystem() == self.vehicle_system:
             self._heartbeat = message
+            self._judge_status()
+
+    def _judge_status(self) -> None:
+        if self._heartbeat is not None:
+            self.status = codec.decode_status(self._heartbeat, self._extended)
 
     def _take_position(self, message: Message) -> None:
-        values = np.array((message.x, message.y, message.z, message.vx, message.vy, message.vz))
-        self._put(self._position, codec.from_ms(message.time_boot_ms), values[:3], values[3:])
+        m = message
+        self._put(self._position, m.time_boot_ms, (m.x, m.y, m.z), (m.vx, m.vy, m.vz))
 
     def _take_attitude(self, message: Message) -> None:
         m = message
-        q_ned_frd = np.array((m.q1, m.q2, m.q3, m.q4))
-        rates_frd_rad_s = np.array((m.rollspeed, m.pitchspeed, m.yawspeed))
-        self._put(self._attitude, codec.from_ms(m.time_boot_ms), q_ned_frd, rates_frd_rad_s)
+        q_ned_frd = (m.q1, m.q2, m.q3, m.q4)
+        rates_frd_rad_s = (m.rollspeed, m.pitchspeed, m.yawspeed)
+        self._put(self._attitude, m.time_boot_ms, q_ned_frd, rates_frd_rad_s)
 
-    def _put(self, samples: Samples, t_s: float, value: Any, rate: Any) -> None:
-        if not (np.isfinite(value).all() and np.isfinite(rate).all()):
+    def _put(self, samples: Samples, time_boot_ms: int, value: tuple[float, ...], rate: tuple[float, ...]) -> None:
+        if not all(map(math.isfinite, (*value, *rate))):
             return  # an estimate that is not there yet: as if nothing was heard
+        t_s = codec.from_ms(time_boot_ms)
         if t_s < samples.newest_s - REBOOT_S:
             self.reboots += 1
             self._position.clear()
             self._attitude.clear()
             self._last_scan_s = -math.inf
-        samples.put(t_s, value, rate)
+        samples.put(t_s, np.array(value), np.array(rate))
 
     def _take_scan(self, message: Message) -> Inputs | None:
         if self._params.lidar_component not in (0, message.get_srcComponent()):
