@@ -73,12 +73,16 @@ class LandingCommand:
 
 
 def start(state: VehicleState, goal_ned_m: F64, goal_down_m: float, down_sp_m: float) -> LandingState:
-    """Enter Landing at ``state`` for the goal (2,) on ground ``goal_down_m``; ``down_sp_m``: height flown so far."""
+    """Enter Landing at ``state`` for the goal (2,) on ground ``goal_down_m``.
+
+    The reference starts at ``down_sp_m``, the height asked for so far, or at the vehicle where that is lower: a second
+    attempt does not climb first.
+    """
     return LandingState(
         t_s=state.t_s,
         line=line_through(state.pos_ned_m[:2], goal_ned_m),
         goal_down_m=goal_down_m,
-        down_ref_m=down_sp_m,
+        down_ref_m=max(down_sp_m, float(state.pos_ned_m[2])),
         rate_m_s=0.0,
         yaw_ref_rad=yaw_rad(state.q_ned_frd),
         yaw_kept=False,

@@ -232,7 +232,8 @@ def test_drifting_out_of_a_landing_waits_for_the_dwell_and_is_no_abort() -> None
 @pytest.mark.parametrize("name", ["goal_distance_m", "d_min_m", "s_fuzzy"])
 @pytest.mark.parametrize("facts", [OPEN, NEAR_GOAL])
 def test_an_unknown_fact_is_unsafe_in_every_mode(name: str, facts: Facts) -> None:
-    unknown = replace(facts, **{name: math.nan})
+    changed: dict[str, Any] = {name: math.nan}
+    unknown = replace(facts, **changed)
     for mode in NavMode:
         assert arbiter.wish_of(mode, unknown, thresholds(ArbiterParams())).mode == NavMode.RL
     assert not landing_safe(unknown, thresholds(ArbiterParams()))
@@ -299,8 +300,10 @@ def test_the_sensitivity_schedule_keeps_the_hysteresis(s_scale: float, d_scale: 
     assert limits.s_enter < limits.s_exit
     assert limits.s_abort < limits.s_land
     assert limits.d_abort_m < limits.d_land_m
-    assert limits.s_enter == pytest.approx(0.85 * s_scale)
-    assert limits.d_exit_m == pytest.approx(3.5 * d_scale)
+    scores = (limits.s_enter, limits.s_exit, limits.s_land, limits.s_abort)
+    assert scores == pytest.approx((0.85 * s_scale, 0.88 * s_scale, 0.30 * s_scale, 0.20 * s_scale))
+    assert (limits.d_enter_m, limits.d_exit_m) == pytest.approx((3.0 * d_scale, 3.5 * d_scale))
+    assert (limits.d_land_m, limits.d_abort_m, limits.land_in_m, limits.land_out_m) == (1.0, 0.7, 2.0, 3.0)
 
 
 def test_parameter_names_are_unique_and_fit_the_wire() -> None:

@@ -95,6 +95,13 @@ def test_stanley_on_a_hand_worked_case() -> None:
     assert guidance.stanley_rad(1.1, 0.3, 1.0, params) == pytest.approx(-(0.3 + math.pi / 4))
 
 
+def test_pd_on_hand_worked_cases() -> None:
+    params = LineParams(law="pd", max_rate_rad_s=5.0)
+    assert guidance.pd_rad_s(0.4, 0.2, params) == pytest.approx(-(1.5 * 0.2 + 0.5 * 0.4))
+    assert guidance.pd_rad_s(100.0, 0.2, params) == pytest.approx(-1.5 * (0.2 + 0.8))  # pull of the line saturated
+    assert guidance.pd_rad_s(100.0, 0.2, PD) == -1.0
+
+
 @pytest.mark.parametrize("law", ["stanley", "pd"])
 @settings(max_examples=25, deadline=None)
 @given(cross_m=st.floats(-15, 15), heading_rad=st.floats(-3.1, 3.1), speed_m_s=st.floats(0.5, 4.0))

@@ -174,6 +174,11 @@ def test_the_descent_goes_on_after_a_pause() -> None:
     assert body.on_ground
 
 
+@pytest.mark.parametrize(("height_m", "down_ref_m"), [(1.5, -1.5), (4.0, -3.0)])
+def test_a_second_attempt_starts_from_where_the_vehicle_is_without_a_climb(height_m: float, down_ref_m: float) -> None:
+    assert landing.start(hovering(1.0, height_m), GOAL_NED_M, 0.0, -3.0).down_ref_m == down_ref_m
+
+
 def test_the_descent_is_slow_near_the_ground() -> None:
     flight = fly(entry(0.5, 0.0, 8.0))
     low = [s for s in flight if s.state.pos_ned_m[2] > -1.0]
