@@ -256,7 +256,8 @@ def _sector_count(increment_deg: float) -> int:
 def _wire_cm(range_m: F64, max_cm: int) -> F64:
     """Ranges as the integers of the wire, still as floats: hit, max + 1 for free, 65535 for unknown."""
     wire_cm = np.rint(range_m * 1e2)
-    np.clip(wire_cm, 0.0, max_cm, out=wire_cm)
+    np.minimum(wire_cm, max_cm, out=wire_cm)
+    np.maximum(wire_cm, 0.0, out=wire_cm)
     wire_cm[np.isinf(range_m)] = max_cm + 1
     wire_cm[np.isnan(range_m)] = UNKNOWN_CM
     return wire_cm
@@ -314,8 +315,10 @@ def _part(value: F64 | None, bits: tuple[int, int, int]) -> tuple[tuple[float, .
     if value is None:
         return _NO_PART, sum(bits)
     axes = tuple(value.tolist())
+    if not any(map(math.isnan, axes)):
+        return axes, 0
     left_out = sum(bit for axis, bit in zip(axes, bits, strict=True) if math.isnan(axis))
-    return (axes if not left_out else tuple(0.0 if math.isnan(a) else a for a in axes)), left_out
+    return tuple(0.0 if math.isnan(axis) else axis for axis in axes), left_out
 
 
 def _setpoint(t_s: float, mask: int, values: tuple[float, ...]) -> Setpoint:
@@ -329,9 +332,9 @@ def _setpoint(t_s: float, mask: int, values: tuple[float, ...]) -> Setpoint:
 
 
 def _axes(values: tuple[float, ...], mask: int, bits: tuple[int, int, int]) -> F64 | None:
-    left_out = [bool(mask & bit) for bit in bits]
-    if all(left_out):
+    left_out = mask & (bits[0] | bits[1] | bits[2])
+    if not left_out:
+        return np.array(values)
+    if left_out == sum(bits):
         return None
-    if any(left_out):
-        return np.array([math.nan if out else v for v, out in zip(values, left_out, strict=True)])
-    return np.array(values)
+    return np.array([math.nan if mask & bit else value for value, bit in zip(values, bits, strict=True)])
