@@ -246,6 +246,23 @@ def test_touchdown_needs_place_height_speed_and_heading_together(
     assert touched == settled
 
 
+def test_a_raised_pad_is_landed_on_and_judged_by_its_own_height() -> None:
+    body = entry(0.5, 0.0, 5.0)
+    body.ground_down_m = -1.2
+    flight = fly(body, limit_s=20.0, goal_down_m=-1.2, until_ground=False)
+    assert flight[-1].command.touchdown
+    assert body.touch_speed_m_s < 0.7
+
+
+def test_without_a_settling_time_touchdown_still_needs_the_ground() -> None:
+    memory = landing.start(hovering(0.0, 2.0), GOAL_NED_M, 0.0, -2.0)
+    quick = replace(PARAMS, settle_s=0.0)
+    memory, command = landing.step(memory, hovering(0.0, 2.0, t_s=TICK_S), True, quick)
+    assert not command.touchdown
+    _, command = landing.step(memory, hovering(0.0, 0.0, t_s=2 * TICK_S), True, quick)
+    assert command.touchdown
+
+
 def test_one_disturbed_tick_starts_the_settling_time_again() -> None:
     still = hovering(0.0, 0.0)
     memory = landing.start(still, GOAL_NED_M, 0.0, 0.0)
