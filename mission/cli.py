@@ -17,6 +17,7 @@ from mission.cli_worlds import app as worlds_app
 from mission.errors import FlightError, InputError
 
 PROG = "swiftnav"
+GROUPS: tuple[list[str], ...] = ([], ["worlds"], ["params"], ["bench"])  # nothing to do: help
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells have it
@@ -24,7 +25,6 @@ EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 app = typer.Typer(
     help="SWIFT-Nav: a companion app that flies PX4-class vehicles through clutter, and a vehicle to fly it against.",
     epilog="Example: swiftnav fly trajectory2 --seed 1",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
@@ -47,12 +47,16 @@ def companion() -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; one line on stderr for whatever went wrong."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if given in GROUPS:
+        given.append("--help")
     try:
         if given[:1] == ["companion"]:
             from mission.cli_companion import companion as run_companion
 
             return run_companion(given[1:])
         code = app(given, prog_name=PROG, standalone_mode=False)
+        if code == EXIT_INTERRUPTED:  # typer has caught Ctrl-C
+            raise KeyboardInterrupt
         return code if isinstance(code, int) else 0
     except typer.TyperException as error:
         return _complain(error.format_message(), EXIT_BAD_INPUT)

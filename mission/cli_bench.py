@@ -4,7 +4,7 @@ import typer
 
 from mission.cli_options import Json, Seed, print_json, require_extra
 
-app = typer.Typer(help="Measurements.", no_args_is_help=True)
+app = typer.Typer(help="Measurements.")
 
 
 @app.callback()

@@ -18,6 +18,7 @@ from mission.cli_options import (
     print_json,
     require_extra,
 )
+from mission.errors import FlightError
 
 DEFAULT_MISSION = "trajectory2"
 
@@ -41,7 +42,7 @@ def fly(
     operator_url: OperatorUrl = None,
     out: Out = None,
     json: Json = False,
-) -> int:
+) -> None:
     """Fly a mission over MAVLink, judge it, leave a flight folder. Exit code 0 only on success."""
     require_extra("sitl", "fly")
     from mission.console import FlightConsole, LogTail, print_result
@@ -62,4 +63,5 @@ def fly(
         print_json(result.as_dict())
     else:
         print_result(result)
-    return 0 if result.success else 1
+    if not result.success:
+        raise FlightError(f"flight failed: {result.reason}")

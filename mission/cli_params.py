@@ -8,7 +8,7 @@ from companion.core.params import ParamInfo, infos, nearest
 from mission.cli_options import Json, print_json
 from mission.errors import InputError
 
-app = typer.Typer(help="The companion's parameters.", no_args_is_help=True)
+app = typer.Typer(help="The companion's parameters.")
 
 
 @app.command("list", epilog="Example: swiftnav params list --json")

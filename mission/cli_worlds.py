@@ -8,7 +8,7 @@ import typer
 from mission.cli_options import Json, Seed, print_json, require_extra
 from mission.errors import InputError
 
-app = typer.Typer(help="Worlds to fly in.", no_args_is_help=True)
+app = typer.Typer(help="Worlds to fly in.")
 
 
 @app.command("list", epilog="Example: swiftnav worlds list")

@@ -129,7 +129,8 @@ def print_result(result: Result, console: Console | None = None) -> None:
     """The verdict and its figures."""
     console = console or Console(highlight=False)
     style = "bold green" if result.success else "bold red"
-    console.print(Text("success" if result.success else "failure", style=style), Text(result.reason))
+    verdict = f"success: {result.reason}" if result.success else "failure"  # why: on stderr
+    console.print(Text(verdict, style=style))
     table = Table.grid(padding=(0, 2))
     for label, value in _summary(result):
         table.add_row(Text(label, style="dim"), Text(value))

@@ -7,7 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, Strict, field_validator, model_validator
 
 from companion.core.params import nearest
 from mission.errors import InputError
@@ -15,6 +15,7 @@ from mission.plan_file import read_plan
 from mission.strict_yaml import StrictModel, checked, read_yaml
 
 Real = Annotated[float, Strict()]
+POLICIES = ("geometric",)
 TIME_LIMIT_MAX_S = 3600.0
 Turbulence = Literal["none", "light", "moderate", "severe"]
 
@@ -67,9 +68,16 @@ class Mission(StrictModel):
     )  # radius of the disc in which the seed places the vehicle
     wind: WindSpec = WindSpec()
     noise: NoiseSpec = NoiseSpec()
-    policy: Literal["geometric"] = "geometric"
+    policy: str = "geometric"
     success: Success
     params: dict[str, dict[str, Any]] = Field(default_factory=dict)
+
+    @field_validator("policy")
+    @classmethod
+    def _known_policy(cls, name: str) -> str:
+        if name not in POLICIES:
+            raise ValueError(f"unknown policy{nearest(name, list(POLICIES))}")
+        return name
 
 
 def list_missions() -> list[str]:

@@ -69,9 +69,12 @@ def fly(plan: FlightPlan, settings: FlySettings, folder: Path, console: FlightCo
     except FlightError as error:
         trouble = str(error)
     except KeyboardInterrupt:
-        _finish(plan, folder, "interrupted")
+        write_result(judge(plan, folder, "interrupted"), folder)
         raise
-    return _finish(plan, folder, trouble)
+    result = judge(plan, folder, trouble)
+    write_result(result, folder)
+    _draw(plan, folder, result)
+    return result
 
 
 async def _fly(
@@ -128,8 +131,9 @@ def _write_vehicle(plan: FlightPlan, settings: FlySettings, folder: Path) -> Pat
 def _check_running(companion: Child, vehicle: Child) -> None:
     """Raise FlightError when the vehicle has ended, or the companion other than by landing."""
     for child, fine in ((vehicle, None), (companion, 0)):
-        if child.exit_code not in (None, fine):
-            raise FlightError(f"the {child.name} ended: {child.last_line() or f'exit code {child.exit_code}'}")
+        code = child.exit_code
+        if code is not None and code != fine:
+            raise FlightError(f"the {child.name} ended: {f'signal {-code}' if code < 0 else child.last_line() or code}")
 
 
 def _end_on_sigterm_too() -> None:
@@ -138,10 +142,7 @@ def _end_on_sigterm_too() -> None:
         signal.signal(signal.SIGTERM, signal.getsignal(signal.SIGINT))
 
 
-def _finish(plan: FlightPlan, folder: Path, trouble: str | None) -> Result:
+def _draw(plan: FlightPlan, folder: Path, result: Result) -> None:
     from mission.figures import draw_flight  # matplotlib: loaded while nothing flies
 
-    result = judge(plan, folder, trouble)
-    write_result(result, folder)
     draw_flight(plan, folder, result)
-    return result

@@ -10,6 +10,7 @@ from typing import Any
 from companion import navigator as companion_navigator
 from companion.app.config import CompanionConfig, ConfigError, check
 from companion.app.logs import FlightLogs, LogFolderError
+from companion.app.memory_use import peak_rss_mb
 from companion.app.process import Companion, OnStatus, Say
 from companion.app.session import Navigator
 from companion.app.signals import StopRequest, stop_on_signals
@@ -75,7 +76,8 @@ def _ended(
     assert companion.exit_code is not None
     summary = Summary(companion.exit_code, companion.reason, logs.ticks, logs.record_sha256, str(config.log_dir))
     counts = {link.transport.name: dataclasses.asdict(link.counts) for link in links}
-    logs.event("end", links=counts, dropped_scans=companion.dropped_scans, **dataclasses.asdict(summary))
+    facts = {"links": counts, "dropped_scans": companion.dropped_scans, "max_rss_mb": peak_rss_mb()}
+    logs.event("end", **facts, **dataclasses.asdict(summary))
     logs.close()
     if logs.problem is not None:
         say(logs.problem)

@@ -60,7 +60,7 @@ def test_a_yaml_file_is_read_as_written(tmp_path: Path) -> None:
         ("[0.0, 2.0]", "[3.0, 2.0]", "low <= high"),
         ("{time_limit_s: 40}", "{}", "key 'success.time_limit_s' is missing"),
         ("{mean_m_s", "{mean_m_s: [", "line"),
-        ("name: mine", "policy: learnd", "should be 'geometric'"),
+        ("name: mine", "policy: geometrc", "did you mean 'geometric'?"),
     ],
 )
 def test_a_wrong_mission_is_refused_in_one_line(tmp_path: Path, old: str, new: str, expected: str) -> None:
