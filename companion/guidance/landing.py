@@ -1,8 +1,9 @@
 """Which setpoint brings the vehicle down onto the goal? Pure; local ned, ``down_m`` positive downwards.
 
 Closing in: the paper's speed profile along the direction to the goal plus a lateral term on the approach line, given
-as a position setpoint just far enough ahead for the autopilot's position loop to ask for that velocity. Descent: a
-bounded-rate reference that goes on below the ground until the autopilot reports ON_GROUND.
+as a position setpoint just far enough ahead for the autopilot's position loop to ask for that velocity, and as an
+acceleration that makes its velocity loop stiffer. Descent: a bounded-rate reference that goes on below the ground until
+the autopilot reports ON_GROUND.
 """
 
 import math
@@ -28,6 +29,8 @@ class LandingParams:
     k_perp: float = param(0.3, "LND_K_PERP", "lateral speed per metre off the approach line", "1/s", 0.0, 3.0)
     k_perp_d: float = param(0.1, "LND_K_PERP_D", "lateral speed taken off per lateral speed", "", 0.0, 1.0)
     kp_pos: float = param(0.95, "LND_KP_POS", "position gain of the autopilot (MPC_XY_P)", "1/s", 0.1, 5.0)
+    k_acc: float = param(2.2, "LND_K_ACC", "acceleration feed-forward per velocity error", "1/s", 0.0, 2.5)
+    a_max_m_s2: float = param(4.0, "LND_A_MAX", "limit of that acceleration", "m/s2", 0.0, 6.0)
     r_desc_m: float = param(0.4, "LND_R_DESC", "descent only nearer to the goal than this", "m", 0.05, 5.0)
     r_touch_m: float = param(0.2, "LND_R_TOUCH", "the same near the ground", "m", 0.05, 5.0)
     r_slope: float = param(0.1, "LND_R_SLOPE", "how fast the one widens to the other with height", "", 0.0, 2.0)
@@ -67,6 +70,7 @@ class LandingCommand:
 
     pos_ned_m: F64  # (3,)
     vel_ned_m_s: F64  # (3,) feed-forward: descent only
+    acc_ned_m_s2: F64  # (3,) feed-forward: horizontal only
     yaw_rad: float
     descending: bool
     touchdown: bool
@@ -99,10 +103,12 @@ def step(
     descending = safe and _may_descend(landing, state, params)
     landing = _lowered(landing, float(state.pos_ned_m[2]), dt_s if descending else 0.0, params)
     landing = replace(landing, settled_s=landing.settled_s + dt_s if _settled(landing, state, params) else 0.0)
-    sp_ned_m = state.pos_ned_m[:2] + closing_velocity(landing.line, state, params) / params.kp_pos
+    velocity = closing_velocity(landing.line, state, params)
+    sp_ned_m = state.pos_ned_m[:2] + velocity / params.kp_pos
     return landing, LandingCommand(
         pos_ned_m=np.array([sp_ned_m[0], sp_ned_m[1], landing.down_ref_m]),
         vel_ned_m_s=np.array([0.0, 0.0, landing.rate_m_s]),
+        acc_ned_m_s2=_acceleration(velocity - state.vel_ned_m_s[:2], params),
         yaw_rad=landing.yaw_ref_rad,
         descending=descending,
         touchdown=landing.settled_s > 0.0 and landing.settled_s >= params.settle_s,
@@ -137,6 +143,13 @@ def descent_radius(height_m: float, params: LandingParams) -> float:
     if height_m < params.h_commit_m:
         return params.r_desc_m
     return min(params.r_touch_m + params.r_slope * height_m, params.r_desc_m)
+
+
+def _acceleration(error_m_s: F64, params: LandingParams) -> F64:
+    """Feed-forward (3,) towards the velocity asked for, limited in norm."""
+    norm_m_s2 = params.k_acc * float(np.hypot(error_m_s[0], error_m_s[1]))
+    gain = params.k_acc * min(1.0, params.a_max_m_s2 / norm_m_s2) if norm_m_s2 > 0.0 else 0.0
+    return np.array([gain * error_m_s[0], gain * error_m_s[1], 0.0])
 
 
 def _aligned(landing: LandingState, state: VehicleState, params: LandingParams) -> LandingState:

@@ -40,7 +40,7 @@ class PointMass:
         vel_sp = gains_p * (cmd.pos_ned_m - self.pos) + cmd.vel_ned_m_s
         vel_sp[2] = min(vel_sp[2], 3.0)
         error = vel_sp - self.vel
-        acc = gains_v * error + self.integral
+        acc = gains_v * error + self.integral + cmd.acc_ned_m_s2
         norm = float(np.linalg.norm(acc[:2]))
         if norm > 6.0:
             acc[:2] *= 6.0 / norm
@@ -339,6 +339,28 @@ def test_drift_off_the_approach_line_is_steered_back() -> None:
     assert landing.closing_velocity(memory.line, drifting, PARAMS)[1] == pytest.approx(still[1] - PARAMS.k_perp_d)
 
 
+@pytest.mark.parametrize(
+    ("vel_ned_m_s", "acc_ned_m_s2"),
+    [
+        ((0.8, 0.0, 1.0), (0.0, 0.0, 0.0)),  # as asked: nothing to add, nothing vertical
+        ((1.8, 0.0, 0.0), (-2.2, 0.0, 0.0)),
+        ((3.8, 4.0, 0.0), (-2.4, -3.2, 0.0)),  # 2.2 * (-3, -4) cut to 4 in norm
+    ],
+)
+def test_acceleration_makes_up_for_the_velocity_error_within_its_limit(
+    vel_ned_m_s: tuple[float, float, float], acc_ned_m_s2: tuple[float, float, float]
+) -> None:
+    params = replace(PARAMS, k_perp_d=0.0)  # no lateral damping: hand-worked
+    state = replace(hovering(1.0, 3.0), vel_ned_m_s=np.array(vel_ned_m_s))
+    _, command = landing.step(landing.start(state, GOAL_NED_M, 0.0, -3.0), state, True, params)
+    assert command.acc_ned_m_s2 == pytest.approx(np.array(acc_ned_m_s2))
+
+
+def test_a_fast_entry_does_not_overshoot_the_goal() -> None:
+    flight = fly(entry(2.0, 0.0, 3.0, speed_m_s=3.0))
+    assert max(float(s.state.pos_ned_m[0] - GOAL_NED_M[0]) for s in flight) < 0.1
+
+
 def test_a_gap_in_time_moves_the_reference_by_one_bounded_step_and_a_step_back_by_none() -> None:
     memory = landing.start(hovering(0.1, 5.0), GOAL_NED_M, 0.0, -5.0)
     later, _ = landing.step(memory, hovering(0.1, 5.0, t_s=60.0), True, PARAMS)
@@ -374,4 +396,5 @@ def test_a_mirrored_approach_gives_the_mirrored_setpoint(
 
     one, other = command(1.0), command(-1.0)
     assert other.pos_ned_m == pytest.approx(one.pos_ned_m * [1, -1, 1])
+    assert other.acc_ned_m_s2 == pytest.approx(one.acc_ned_m_s2 * [1, -1, 1])
     assert abs(frames.wrap_rad(other.yaw_rad + one.yaw_rad)) < 1e-9
