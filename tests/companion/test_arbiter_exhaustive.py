@@ -12,7 +12,10 @@ from companion.arbiter.arbiter import ArbiterState
 from companion.arbiter.facts import ArbiterParams, Facts, thresholds
 from companion.core.types import NavMode
 
-PARAMS = ArbiterParams()
+PARAMS = ArbiterParams(
+    d_enter_m=3.0, d_exit_m=3.5, s_enter=0.85, s_exit=0.88, s_land=0.3, s_abort=0.2, d_land_m=1.0, d_abort_m=0.7,
+    land_in_m=2.0, land_out_m=3.0, debounce_ticks=5, debounce_s=0.2, dwell_s=1.0,
+)  # fmt: skip  # the defaults may be tuned, the rules may not
 LIMITS = thresholds(PARAMS)
 TICK_S = 0.04
 NAN = math.nan

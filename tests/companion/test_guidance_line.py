@@ -1,6 +1,7 @@
 """Does the guidance line measure errors as the paper defines them, and do its laws steer back to it?"""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,10 +97,10 @@ def test_stanley_on_a_hand_worked_case() -> None:
 
 
 def test_pd_on_hand_worked_cases() -> None:
-    params = LineParams(law="pd", max_rate_rad_s=5.0)
+    params = LineParams(law="pd", k_psi=1.5, k_y=0.5, max_course_rad=0.8, max_rate_rad_s=5.0)
     assert guidance.pd_rad_s(0.4, 0.2, params) == pytest.approx(-(1.5 * 0.2 + 0.5 * 0.4))
     assert guidance.pd_rad_s(100.0, 0.2, params) == pytest.approx(-1.5 * (0.2 + 0.8))  # pull of the line saturated
-    assert guidance.pd_rad_s(100.0, 0.2, PD) == -1.0
+    assert guidance.pd_rad_s(100.0, 0.2, replace(params, max_rate_rad_s=1.0)) == -1.0
 
 
 @pytest.mark.parametrize("law", ["stanley", "pd"])
