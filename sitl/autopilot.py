@@ -6,13 +6,10 @@ Local ned: the origin is home, where the vehicle booted.
 """
 
 import math
-from dataclasses import dataclass
-from enum import IntEnum
 from typing import Final
 
-from pymavlink.dialects.v20 import common as mav
-
 from companion.core.types import LandedState, VehicleState
+from sitl.answers import ACCEPTED, CRITICAL, INFO, CommandResult, Result, StatusText
 from sitl.demand import IDLE, Demand, TrajectorySetpoint
 from sitl.failsafe import Failsafe, offboard_loss
 from sitl.land_detector import LandDetector
@@ -22,9 +19,6 @@ from sitl.steering import Behaviour, Steering, asks_to_climb
 
 READY_S: Final = 2.5  # PX4 v1.16 SIH: prearm checks pass two to three seconds after boot
 
-CRITICAL: Final = mav.MAV_SEVERITY_CRITICAL
-INFO: Final = mav.MAV_SEVERITY_INFO
-
 _BEHAVIOUR: Final = {
     FlightMode.HOLD: Behaviour.HOLD,
     FlightMode.TAKEOFF: Behaviour.TAKEOFF,
@@ -32,40 +26,6 @@ _BEHAVIOUR: Final = {
     FlightMode.RTL: Behaviour.RETURN,
     FlightMode.OFFBOARD: Behaviour.OFFBOARD,
 }
-
-
-class Result(IntEnum):
-    """MAV_RESULT."""
-
-    ACCEPTED = mav.MAV_RESULT_ACCEPTED
-    TEMPORARILY_REJECTED = mav.MAV_RESULT_TEMPORARILY_REJECTED
-    DENIED = mav.MAV_RESULT_DENIED
-    UNSUPPORTED = mav.MAV_RESULT_UNSUPPORTED
-    FAILED = mav.MAV_RESULT_FAILED
-
-
-@dataclass(frozen=True, slots=True)
-class StatusText:
-    """One STATUSTEXT to be."""
-
-    severity: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class CommandResult:
-    """The answer to a command and the reason, empty when there is nothing to say."""
-
-    result: Result
-    text: str = ""
-
-    @property
-    def accepted(self) -> bool:
-        """Was the command carried out?"""
-        return self.result is Result.ACCEPTED
-
-
-ACCEPTED: Final = CommandResult(Result.ACCEPTED)
 
 
 class Autopilot:
@@ -199,7 +159,7 @@ class Autopilot:
         if not self._ready_said and self.ready:
             self._ready_said = True
             self._say(INFO, "Ready for takeoff!")
-        self._detect_ground(contact)
+        self._detect_ground(state, contact)
         if not self.armed:
             self.demand = IDLE
             return
@@ -213,12 +173,11 @@ class Autopilot:
             self.user_mode = FlightMode.HOLD
             self._steering.settle()
 
-    def _detect_ground(self, contact: bool) -> None:
-        assert self._state is not None
-        if not self._detector.update(self._state, contact, self._wants_up()):
+    def _detect_ground(self, state: VehicleState, contact: bool) -> None:
+        if not self._detector.update(state, contact, self._wants_up()):
             return
         if self.landed:
-            self._landed_s = self._state.t_s
+            self._landed_s = state.t_s
             self._steering.restart()
             self._say(INFO, "Landing detected")
         else:

@@ -6,16 +6,16 @@ NaN in a parameter is normal (MAVSDK fills unused ones with it) and never an err
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from pymavlink.dialects.v20 import common as mav
 
 from sitl import modes
-from sitl.autopilot import CommandResult, Result
+from sitl.answers import CommandResult, Result
 from sitl.extra_messages import PROTOCOL_VERSION_ID, protocol_version
+from sitl.link import Link
 from sitl.messages import BUILDERS, ORIGIN, Message
 from sitl.simulation import Simulation
-from sitl.streams import StreamSchedule
 
 FORCE: Final = 21196.0  # MAV_CMD_COMPONENT_ARM_DISARM, p2: arm or disarm whatever the state
 ANYBODY: Final = frozenset({mav.MAV_CMD_REQUEST_PROTOCOL_VERSION, mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES})
@@ -61,10 +61,10 @@ def from_set_mode(message: Message) -> Command:
     return Command(mav.MAV_CMD_DO_SET_MODE, (float(message.base_mode), float(main), float(sub), *[math.nan] * 4))
 
 
-def execute(command: Command, sim: Simulation, streams: tuple[StreamSchedule, ...]) -> Answer:
-    """Carry out a command that came over the link with these ``streams``."""
+def execute(command: Command, sim: Simulation, link: Link) -> Answer:
+    """Carry out a command that came over ``link``."""
     handler = _HANDLERS.get(command.id)
-    return handler(command, sim, streams) if handler is not None else UNSUPPORTED
+    return handler(command, sim, link) if handler is not None else UNSUPPORTED
 
 
 def request_message(message_id: int, sim: Simulation) -> Answer:
@@ -76,7 +76,7 @@ def request_message(message_id: int, sim: Simulation) -> Answer:
     return Answer(Result.ACCEPTED, (message,)) if message is not None else DENIED
 
 
-def _arm(command: Command, sim: Simulation, _streams: Any) -> Answer:
+def _arm(command: Command, sim: Simulation, _link: Link) -> Answer:
     arm, force = command.params[0], command.params[1] == FORCE
     if arm == 1.0:
         return _answer(sim.autopilot.command_arm(force))
@@ -85,67 +85,65 @@ def _arm(command: Command, sim: Simulation, _streams: Any) -> Answer:
     return Answer(Result.TEMPORARILY_REJECTED)
 
 
-def _set_mode(command: Command, sim: Simulation, _streams: Any) -> Answer:
+def _set_mode(command: Command, sim: Simulation, _link: Link) -> Answer:
     flags, main, sub = (_whole(p) for p in command.params[:3])
     if flags is None or main is None or not flags & mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
         return Answer(Result.TEMPORARILY_REJECTED)
     return _answer(sim.autopilot.command_mode(modes.from_main_sub(main, sub or 0)))
 
 
-def _takeoff(command: Command, sim: Simulation, _streams: Any) -> Answer:
+def _takeoff(command: Command, sim: Simulation, _link: Link) -> Answer:
     alt_amsl_m = command.params[6]
     down_m = ORIGIN.down_m(alt_amsl_m) if math.isfinite(alt_amsl_m) else None
     return _answer(sim.autopilot.command_takeoff(down_m))
 
 
-def _land(_command: Command, sim: Simulation, _streams: Any) -> Answer:
+def _land(_command: Command, sim: Simulation, _link: Link) -> Answer:
     return _answer(sim.autopilot.command_land())
 
 
-def _return(_command: Command, sim: Simulation, _streams: Any) -> Answer:
+def _return(_command: Command, sim: Simulation, _link: Link) -> Answer:
     return _answer(sim.autopilot.command_mode(modes.FlightMode.RTL))
 
 
-def _request_message(command: Command, sim: Simulation, _streams: Any) -> Answer:
+def _request_message(command: Command, sim: Simulation, _link: Link) -> Answer:
     message_id = _whole(command.params[0])
     return request_message(message_id, sim) if message_id is not None else DENIED
 
 
-def _set_interval(command: Command, _sim: Simulation, streams: tuple[StreamSchedule, ...]) -> Answer:
+def _set_interval(command: Command, _sim: Simulation, link: Link) -> Answer:
     message_id, interval_us = _whole(command.params[0]), _whole(command.params[1])
     extras = (command.params[2], command.params[3], command.params[6])
     if any(math.isfinite(p) and p != 0.0 for p in extras) or message_id is None or interval_us is None:
         return FAILED
     if message_id not in BUILDERS or message_id == mav.MAVLINK_MSG_ID_HEARTBEAT:
         return FAILED
-    for schedule in streams:
-        schedule.set_interval(message_id, interval_us)
+    link.schedule_of(message_id).set_interval(message_id, interval_us)
     return ACCEPTED
 
 
-def _get_interval(command: Command, _sim: Simulation, streams: tuple[StreamSchedule, ...]) -> Answer:
+def _get_interval(command: Command, _sim: Simulation, link: Link) -> Answer:
     message_id = _whole(command.params[0])
     if message_id is None or not 0 <= message_id <= 0xFFFF:
         return FAILED
-    interval_us = max((schedule.interval_us(message_id) for schedule in streams), default=0)
-    if not interval_us:
-        interval_us = -1 if message_id in BUILDERS else 0  # off, or unknown
+    off = -1 if message_id in BUILDERS else 0
+    interval_us = link.schedule_of(message_id).interval_us(message_id) or off
     return Answer(Result.ACCEPTED, (mav.MAVLink_message_interval_message(message_id, interval_us),))
 
 
-def _version(command: Command, sim: Simulation, _streams: Any) -> Answer:
+def _version(command: Command, sim: Simulation, _link: Link) -> Answer:
     return request_message(mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION, sim)
 
 
-def _protocol(command: Command, sim: Simulation, _streams: Any) -> Answer:
+def _protocol(command: Command, sim: Simulation, _link: Link) -> Answer:
     return request_message(PROTOCOL_VERSION_ID, sim)
 
 
-def _home(command: Command, sim: Simulation, _streams: Any) -> Answer:
+def _home(command: Command, sim: Simulation, _link: Link) -> Answer:
     return request_message(mav.MAVLINK_MSG_ID_HOME_POSITION, sim)
 
 
-_HANDLERS: Final[Mapping[int, Callable[[Command, Simulation, tuple[StreamSchedule, ...]], Answer]]] = {
+_HANDLERS: Final[Mapping[int, Callable[[Command, Simulation, Link], Answer]]] = {
     mav.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
     mav.MAV_CMD_DO_SET_MODE: _set_mode,
     mav.MAV_CMD_NAV_TAKEOFF: _takeoff,

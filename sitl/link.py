@@ -48,10 +48,9 @@ class Link:
         self.vehicle = StreamSchedule({i: hz for i, hz in spec.rates_hz.items() if i in by_vehicle})
         self._tlog = tlog
 
-    @property
-    def schedules(self) -> tuple[StreamSchedule, ...]:
-        """Both, for commands that change a rate."""
-        return (self.wall, self.vehicle)
+    def schedule_of(self, message_id: int) -> StreamSchedule:
+        """The schedule that a message of this id belongs to."""
+        return self.vehicle if self.companion and message_id in NAVIGATION else self.wall
 
     def flush(self) -> None:
         """Bring the log to the disk."""

@@ -1,4 +1,4 @@
-"""Up to which physics step may the vehicle be at this wall time? Wall time in, steps out; pure."""
+"""When is a physics step due? Wall time in, steps and waits out; pure."""
 
 import math
 from typing import Final
@@ -15,29 +15,29 @@ class Pacer:
         """Raises ValueError for a speed that is not above zero."""
         if not speed > 0.0:
             raise ValueError(f"speed {speed} is not above 0")
-        self._speed = speed
-        self._step_s = step_s
-        self._wall_s = math.nan
+        self._step_wall_s = step_s / speed  # wall time of one step
+        self._wall_s = -math.inf  # when ``_step`` was due
         self._step = 0
 
     def restart(self) -> None:
         """Forget the past: vehicle time stood still."""
-        self._wall_s = math.nan
+        self._wall_s = -math.inf
 
     def steps_due(self, wall_s: float, step: int, most: int) -> int:
         """Steps to advance now from ``step``, at most ``most``."""
-        if math.isinf(self._speed):
+        if self._step_wall_s == 0.0:
             return most
-        if math.isnan(self._wall_s):
-            self._wall_s, self._step = wall_s, step
-        due = self._step + math.floor((wall_s - self._wall_s) * self._speed / self._step_s + _EPSILON)
-        if (due - step) * self._step_s / self._speed > BEHIND_MAX_S:
-            self._wall_s, self._step = wall_s, step
-            return most
+        self._follow(wall_s, step)
+        due = self._step + math.floor((wall_s - self._wall_s) / self._step_wall_s + _EPSILON)
         return max(0, min(most, due - step))
 
     def wait_s(self, wall_s: float, step: int) -> float:
         """Wall time until ``step`` is due."""
-        if math.isinf(self._speed) or math.isnan(self._wall_s):
+        if self._step_wall_s == 0.0:
             return 0.0
-        return max(0.0, self._wall_s + (step - self._step) * self._step_s / self._speed - wall_s)
+        self._follow(wall_s, step)
+        return max(0.0, self._wall_s + (step - self._step) * self._step_wall_s - wall_s)
+
+    def _follow(self, wall_s: float, step: int) -> None:
+        if wall_s - self._wall_s - (step - self._step) * self._step_wall_s > BEHIND_MAX_S:
+            self._wall_s, self._step = wall_s, step

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import common as mav
 
 from companion.core.frames import yaw_rad
 from sitl import commands, param_protocol, setpoints
-from sitl.autopilot import CRITICAL, StatusText
+from sitl.answers import CRITICAL, StatusText
 from sitl.commands import ANYBODY, Command
 from sitl.link import COMPONENT, Link
 from sitl.simulation import STEP_MS, Simulation
@@ -66,7 +66,7 @@ class Router:
         to_all = command.id in ANYBODY and message.target_system == 0
         if not (to_all or message.target_system == self._system_id) or component not in (0, COMPONENT):
             return
-        answer = commands.execute(command, self._sim, link.schedules)
+        answer = commands.execute(command, self._sim, link)
         ack = mav.MAVLink_command_ack_message(
             command.id, answer.result, 0, 0, message.get_srcSystem(), message.get_srcComponent()
         )

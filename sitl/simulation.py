@@ -104,6 +104,11 @@ class Simulation:
         return self._step
 
     @property
+    def runs_ahead(self) -> bool:
+        """Is the next scan reached before the answer to this one is in force?"""
+        return self._delay_steps > self.scan_steps
+
+    @property
     def finished(self) -> bool:
         """Has the vehicle flown and disarmed?"""
         return self.autopilot.has_flown and not self.autopilot.armed
@@ -133,7 +138,7 @@ class Simulation:
         while self._queue and self._queue[-1][0] >= due:
             self._queue.pop()  # overtaken by this one
         self._queue.append((due, setpoint))
-        self.autopilot.hear_setpoint(self.t_s)
+        self.autopilot.hear_setpoint(self.t_s if scan_ms is None else from_ms(scan_ms))
 
     def set_parameter(self, name: str, value: float) -> None:
         """Change a PX4 parameter. Raises KeyError or ValueError naming it."""

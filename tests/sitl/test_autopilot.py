@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.core.types import LandedState, VehicleState
-from sitl.autopilot import READY_S, Autopilot, Result
+from sitl.answers import Result
+from sitl.autopilot import READY_S, Autopilot
 from sitl.demand import Loop, TrajectorySetpoint, no_axes
 from sitl.modes import ARMABLE, FLYABLE, TITLES, FlightMode, base_mode, from_custom_mode, from_main_sub
 from sitl.px4_params import ParamStore

@@ -11,15 +11,18 @@ import pytest
 from pymavlink.dialects.v20 import common as mav
 
 from companion.core.clock import SystemClock
+from companion.core.codec import decode_status, encode_setpoint
 from companion.core.mavlink import Connection
 from companion.core.tlog import read_tlog
 from companion.core.transport import TransportError
+from companion.core.types import AutopilotStatus, Setpoint
 from companion.core.udp import Udp
+from sitl.gates import Gate, GateKeeper
 from sitl.link import bind, open_links
 from sitl.modes import FlightMode
 from sitl.server import RunConfig, Server
 from sitl.simulation import SimConfig, Simulation
-from sitl.truth_log import TruthFile
+from sitl.truth_log import TruthFile, truth_line
 from sitl.world import World
 
 NAN6 = [math.nan] * 6
@@ -331,20 +334,46 @@ def _answer_scans(companion: Client, stop: threading.Event) -> None:
     while not stop.is_set():
         for message in companion.poll():
             if message.get_type() == "OBSTACLE_DISTANCE":
-                scan_ms = message.time_usec // 1000
-                north_m = min(8.0, max(0.0, (scan_ms - 8000) / 400))
-                companion.send(sp_message(scan_ms, north_m, 0.0, -2.5 if scan_ms < 14_000 else 1.0))
+                companion.send(encode_setpoint(answer(message.time_usec // 1000)))
+
+
+def answer(scan_ms: int) -> Setpoint:
+    """What the companion of these flights wants at a scan: 8 m north, then down."""
+    north_m = min(8.0, max(0.0, (scan_ms - 8000) / 400))
+    return Setpoint(scan_ms / 1e3, np.array([north_m, 0.0, -2.5 if scan_ms < 14_000 else 1.0]), None, None, 0.0)
+
+
+def fly_in_process() -> tuple[bytes, list[AutopilotStatus]]:
+    """The same flight without sockets."""
+    sim, gates, statuses = Simulation(forest(), SimConfig(seed=5)), GateKeeper(companion=False), []
+    at_gate: dict[Gate | None, Callable[[], Any]] = {
+        Gate.ARM: sim.autopilot.command_arm,
+        Gate.TAKEOFF: sim.autopilot.command_takeoff,
+        Gate.OFFBOARD: lambda: sim.autopilot.command_mode(FlightMode.OFFBOARD),
+    }
+    while (gate := gates.waiting(sim)) is not Gate.END:
+        if gate in at_gate:
+            at_gate[gate]()
+            continue
+        statuses.append(sim.advance_to_scan().status)
+        sim.submit(answer(sim.t_ms))
+    text = "".join(truth_line(row, sim.spawn_ned_m) + "\n" for row in sim.rows)
+    return text.encode(), statuses
 
 
 def test_two_lockstep_flights_over_udp_have_the_same_truth_and_the_same_scans(tmp_path: Path) -> None:
     first, seen = fly_lockstep(216, tmp_path / "a")
     again, _ = fly_lockstep(216, tmp_path / "b")
     assert first == again
+    inside, statuses = fly_in_process()
+    assert first == inside, "and so has the flight without sockets"
     assert first.count(b"\n") > 300
     scans = [i for i, m in enumerate(seen) if m.get_type() == "OBSTACLE_DISTANCE"]
     for i in scans:
         kinds = [m.get_type() for m in seen[i - 4 : i]]
         assert kinds == ["HEARTBEAT", "EXTENDED_SYS_STATE", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"]
+        heard = decode_status(seen[i - 4], seen[i - 3])
+        assert heard == statuses[seen[i].time_usec // 40_000 - 1]
         assert seen[i - 1].time_boot_ms * 1000 == seen[i - 2].time_boot_ms * 1000 == seen[i].time_usec
     packets = list(read_tlog(tmp_path / "a" / "vehicle_companion.tlog"))
     assert len(packets) > 5 * len(scans)
@@ -368,6 +397,23 @@ def test_the_clock_stands_at_a_gate_while_heartbeats_go_on() -> None:
         client.close()
         assert len(beats) == 3
         assert server.sim.t_s == 0.0
+
+
+def test_a_rate_asked_for_is_kept_and_can_be_taken_back() -> None:
+    with vehicle(220, RunConfig(speed=1.0)):
+        client = Client(14540 + 220, 14580 + 220)
+        client.message("HEARTBEAT")
+        counts = []
+        for interval_us in (100_000.0, -1.0, 0.0):
+            assert client.command(511, 32, interval_us) == 0
+            client.seen.clear()
+            deadline_s = time.monotonic() + 1.0
+            while time.monotonic() < deadline_s:
+                client.poll()
+            counts.append(sum(m.get_type() == "LOCAL_POSITION_NED" for m in client.seen))
+        client.close()
+    scans = 25  # each scan brings its position with it
+    assert counts == [pytest.approx(c, rel=0.3) for c in (scans, scans, 50)]
 
 
 def test_a_lost_stream_lands_the_vehicle_by_px4s_default() -> None:
