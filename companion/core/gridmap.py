@@ -23,7 +23,8 @@ I32 = NDArray[np.int32]
 AZIMUTH_BINS = 720  # 0.5 deg: 12 cm at 14 m, finer than a cell
 SUBCELLS = 4  # range and azimuth tables exist for 4 x 4 positions of the vehicle inside its cell
 NEVER = np.float32(0.0)  # stamps are vehicle time, which is positive
-RING_M = (0.0, 0.3, 0.5, 0.7, 1.0, 1.4, 1.9, 2.6, 3.5, 4.6, 6.0, 8.0, 11.0)  # inner edges of the rings that share one angular erosion
+# Inner edges of the rings of cells that share one angular erosion.
+RING_M = (0.0, 0.3, 0.5, 0.7, 1.0, 1.4, 1.9, 2.6, 3.5, 4.6, 6.0, 8.0, 11.0)
 CENTRE_BAND_M = 2.0  # the vehicle may stray this far from the middle before the map rolls
 
 AZIMUTH_RAD = (np.arange(AZIMUTH_BINS) + 0.5) * (math.tau / AZIMUTH_BINS)  # bin centres, 0 north, clockwise
@@ -65,6 +66,7 @@ class GridMap:
     free_t: F32  # (n, n) when last certified free
     hit_t: F32  # (n, n) when last hit, NEVER if free since
     hit_ne_m: F32  # (n, n, 2) the hit itself, finer than the cell
+    moved_ne_m: F64  # (m, 2) middle of each arc of the last scan that lies wholly in space certified free lately
 
 
 def empty(params: MapParams) -> GridMap:
@@ -76,6 +78,7 @@ def empty(params: MapParams) -> GridMap:
         np.full((n, n), NEVER, np.float32),
         np.full((n, n), NEVER, np.float32),
         np.zeros((n, n, 2), np.float32),
+        np.empty((0, 2)),
     )
 
 
@@ -84,8 +87,8 @@ def update(grid: GridMap, scan: PolarScan, params: MapParams) -> GridMap:
     grid = _rolled(grid, scan.pos_ne_m)
     hit_t, free_t, hit_ne_m = grid.hit_t.copy(), grid.free_t.copy(), grid.hit_ne_m.copy()
     _certify(grid, free_t, hit_t, scan, params)
-    _paint(grid, free_t, hit_t, hit_ne_m, scan, params)
-    return replace(grid, free_t=free_t, hit_t=hit_t, hit_ne_m=hit_ne_m)
+    moved_ne_m = _paint(grid, free_t, hit_t, hit_ne_m, scan, params)
+    return replace(grid, free_t=free_t, hit_t=hit_t, hit_ne_m=hit_ne_m, moved_ne_m=moved_ne_m)
 
 
 def occupied(grid: GridMap, t_s: float, params: MapParams) -> NDArray[np.bool_]:
@@ -137,6 +140,7 @@ def _rolled(grid: GridMap, pos_ne_m: F64) -> GridMap:
         _shifted(grid.free_t, di, dj, NEVER),
         _shifted(grid.hit_t, di, dj, NEVER),
         _shifted(grid.hit_ne_m, di, dj, np.float32(0.0)),
+        grid.moved_ne_m,
     )
 
 
@@ -169,11 +173,14 @@ def _certify(grid: GridMap, free_t: F32, hit_t: F32, scan: PolarScan, params: Ma
     hit_t[window] *= 1.0 - certain
 
 
-def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarScan, params: MapParams) -> None:
-    """Enter the hits: only where the arc was not certified free lately, or all of it if all of it was."""
+def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarScan, params: MapParams) -> F64:
+    """Enter the hits: only where the arc was not certified free lately, or all of it if all of it was.
+
+    Returns the middles of the latter arcs, (m, 2).
+    """
     near = scan.hit_m < params.sense_m
     if not near.any():
-        return
+        return np.empty((0, 2))
     range_m, sector = scan.hit_m[near], scan.hit_sector[near]
     points = scan.pos_ne_m + AZIMUTH_DIR[scan.hit_bin[near]] * range_m[:, None]
     flat, inside = cells_of(grid, points)
@@ -184,6 +191,13 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     cells = flat[paint]
     hit_t.ravel()[cells] = scan.t_s
     hit_ne_m.reshape(-1, 2)[cells] = points[paint]
+    whole = ~open_arc[sector]
+    if not whole.any():
+        return np.empty((0, 2))
+    count = np.bincount(sector, whole)
+    moved = np.flatnonzero(count)
+    middle = [np.bincount(sector, whole * points[:, axis])[moved] / count[moved] for axis in (0, 1)]
+    return np.stack(middle, axis=1)
 
 
 def _window(n: int, i: int, j: int, radius: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:

@@ -55,6 +55,7 @@ def decide(
         state,
         task.goal_ned_m,
         percept.grid,
+        percept.hazard_ne_m,
         params.vehicle.radius_m,
         prefix,
         observation(state, percept.obstacles_ne_m, engaged.start_ne_m, task.goal_ned_m),

@@ -10,6 +10,7 @@ from companion.guidance.landing import LandingState
 from companion.guidance.limits import HoldMemory
 from companion.guidance.line import GuidanceLine
 from companion.navigator.params import Params
+from companion.perception.movers import Track
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,7 @@ class Memory:
     """Everything remembered; ``engaged`` only while the autopilot reports OFFBOARD and armed."""
 
     grid: GridMap
+    tracks: tuple[Track, ...]
     ticks: int
     t_s: float
     yaw_sp_rad: float
@@ -53,4 +55,4 @@ class Memory:
 
 def start(params: Params) -> Memory:
     """Nothing seen, nobody flies."""
-    return Memory(gridmap.empty(params.map), 0, 0.0, 0.0, None, 0, None)
+    return Memory(gridmap.empty(params.map), (), 0, 0.0, 0.0, None, 0, None)

@@ -11,6 +11,7 @@ from companion.guidance.landing import LandingParams
 from companion.guidance.limits import LimitsParams
 from companion.guidance.line import LineParams
 from companion.link.params import LinkParams
+from companion.perception.movers import MoverParams
 from companion.perception.perceive import PerceptionParams
 from companion.policy.expert import ExpertParams
 
@@ -44,6 +45,7 @@ class Params:
     link: LinkParams = field(default_factory=LinkParams)
     perception: PerceptionParams = field(default_factory=PerceptionParams)
     map: MapParams = field(default_factory=MapParams)
+    movers: MoverParams = field(default_factory=MoverParams)
     arbiter: ArbiterParams = field(default_factory=ArbiterParams)
     policy: PolicyParams = field(default_factory=PolicyParams)
     expert: ExpertParams = field(default_factory=ExpertParams)

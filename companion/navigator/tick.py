@@ -20,7 +20,7 @@ from companion.navigator.memory import Engagement, Memory
 from companion.navigator.params import Params
 from companion.navigator.record import Record
 from companion.navigator.track import Route, Tracked, course_along, track, turned
-from companion.perception.perceive import Percept, perceive
+from companion.perception.perceive import Percept, Remembered, perceive
 
 GROUND_DOWN_M = 0.0  # local NED begins on the ground where the autopilot booted
 
@@ -62,9 +62,17 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
         The next memory, the setpoint that answers the scan, and the record of the tick.
     """
     state = inputs.state
-    percept = perceive(memory.grid, inputs, task.goal_ned_m, params.vehicle.radius_m, params.perception, params.map)
+    percept = perceive(
+        Remembered(memory.t_s, memory.grid, memory.tracks),
+        inputs,
+        task.goal_ned_m,
+        params.vehicle.radius_m,
+        params.perception,
+        params.map,
+        params.movers,
+    )
     dt_s = state.t_s - memory.t_s
-    memory = replace(memory, grid=percept.grid, ticks=memory.ticks + 1, t_s=state.t_s)
+    memory = replace(memory, grid=percept.grid, tracks=percept.tracks, ticks=memory.ticks + 1, t_s=state.t_s)
     goal_m = _goal_distance(state, task)
     if not (inputs.status.offboard and inputs.status.armed):
         memory, setpoint = _standby(memory, state)
@@ -185,7 +193,7 @@ def _land(memory: Memory, engaged: Engagement, scene: _Scene) -> _Steered:
     assert engaged.landing is not None  # set on entry, cleared on exit
     safe = landing_safe(scene.facts, scene.limits)
     began, command = landing.step(engaged.landing, scene.state, safe, scene.params.landing)
-    setpoint = Setpoint(scene.state.t_s, command.pos_ned_m, command.vel_ned_m_s, None, command.yaw_rad)
+    setpoint = Setpoint(scene.state.t_s, command.pos_ned_m, command.vel_ned_m_s, command.acc_ned_m_s2, command.yaw_rad)
     return _Steered(memory, replace(engaged, landing=began, stop=None), setpoint)
 
 
@@ -194,7 +202,7 @@ def _must_stop(scene: _Scene) -> bool:
     return limits.velocity_stop_needed(
         scene.state.pos_ned_m,
         scene.state.vel_ned_m_s,
-        scene.percept.points_ne_m,
+        scene.percept.static_ne_m,
         scene.params.vehicle.radius_m,
         scene.params.limits,
     )

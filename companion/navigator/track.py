@@ -91,4 +91,4 @@ def _clearance(vertices_ne_m: F64, s_m: float, percept: Percept, params: Params)
     """Least distance from the hull to anything beside the stretch about to be flown; inf if nothing is near."""
     radius = params.vehicle.radius_m
     stretch = geometry.part(vertices_ne_m, s_m, s_m + params.limits.side_full_m + radius)
-    return geometry.nearest_distance(stretch, percept.points_ne_m, radius + params.limits.side_full_m) - radius
+    return geometry.nearest_distance(stretch, percept.static_ne_m, radius + params.limits.side_full_m) - radius

@@ -11,6 +11,7 @@ from companion.core.gridmap import GridMap, MapParams, occupied_points, update
 from companion.core.inputs import Inputs
 from companion.core.params import param
 from companion.core.types import F64
+from companion.perception.movers import MoverParams, Track, avoidable, discs, follow, hazards
 from companion.perception.observation import nearest_representatives
 from companion.perception.polar import BEARING_RAD, flatten
 from companion.perception.score import local_density, safety_score
@@ -42,7 +43,10 @@ class Percept:
     """What the rest of the tick knows of the surroundings."""
 
     grid: GridMap
-    points_ne_m: F64  # (k, 2) remembered hits
+    tracks: tuple[Track, ...]  # of what moves
+    static_ne_m: F64  # (k, 2) remembered hits
+    hazard_ne_m: F64  # (h, 2) what movers will sweep within the look-ahead
+    points_ne_m: F64  # (p, 2) hits, and hazards that do not hold the vehicle already: what no path may touch
     obstacles_ne_m: F64  # (<= 20, 2) nearest representatives of this scan
     d_min_m: float  # inf when nothing is within the sensing radius
     s_fuzzy: float
@@ -51,19 +55,33 @@ class Percept:
     line_of_sight: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Remembered:
+    """What perception carries from scan to scan."""
+
+    t_s: float
+    grid: GridMap
+    tracks: tuple[Track, ...]
+
+
 def perceive(
-    grid: GridMap,
+    before: Remembered,
     inputs: Inputs,
     goal_ne_m: F64,
     radius_m: float,
     params: PerceptionParams,
     map_params: MapParams,
+    mover_params: MoverParams,
 ) -> Percept:
     """Digest one scan."""
-    state = inputs.state
+    state, pos_ne_m = inputs.state, inputs.state.pos_ned_m[:2]
     flat = flatten(inputs.scan, state, params.lidar_up_m, params.ground_margin_m)
-    grid = update(grid, flat.polar, map_params)
-    points = occupied_points(grid, state.t_s, map_params)
+    grid = update(before.grid, flat.polar, map_params)
+    tracks = follow(before.tracks, grid.moved_ne_m, pos_ne_m, state.t_s, state.t_s - before.t_s, mover_params)
+    static, swept = occupied_points(grid, state.t_s, map_params), hazards(tracks, mover_params)
+    points = static
+    if len(swept):
+        points = np.concatenate([static, discs(avoidable(swept, pos_ne_m, radius_m, mover_params), mover_params)])
     density = local_density(flat.bearing_range_m, params.density_radius_m)
     scale = sensitivity(density, params)
     score = safety_score(flat.bearing_range_m, params.near_m * scale, params.far_m * scale)
@@ -71,13 +89,16 @@ def perceive(
     d_min = float(seen_m.min()) if seen_m.size else math.inf
     return Percept(
         grid,
+        tracks,
+        static,
+        discs(swept, mover_params),
         points,
         _representatives(flat.bearing_range_m, inputs, params.sense_radius_m),
         d_min if d_min <= params.sense_radius_m else math.inf,
         score,
         density,
         scale,
-        line_of_sight(state.pos_ned_m[:2], goal_ne_m, points, radius_m, params),
+        line_of_sight(pos_ne_m, goal_ne_m, points, radius_m, params),
     )
 
 

@@ -6,12 +6,13 @@ minimum seen from far away closes gaps that are open.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.core.geometry import resample
-from companion.core.gridmap import NEVER, GridMap, MapParams, centres, occupied
+from companion.core.gridmap import NEVER, GridMap, MapParams, cells_of, centres, occupied
 from companion.core.params import param
 from companion.core.types import F64
 from companion.policy.grid_path import BLOCKED, clearance_field, reach_from, walk_back
@@ -60,14 +61,24 @@ class GeometricExpert:
 
     def propose(self, query: Query, memory: F64 | None) -> tuple[Proposal | None, F64 | None]:
         """Five waypoints along the cheapest path; see ``Policy.propose``."""
-        hits = occupied(query.grid, query.state.t_s, self._map)
-        clearance = clearance_field(query.grid, hits)
+        clearance = clearance_field(*_with_hazards(query, occupied(query.grid, query.state.t_s, self._map)))
         for margin in (self._params.margin_m, self._params.tight_m):
             field = _field(query, clearance, query.radius_m + margin, self._params)
             path = _plan(query, field, memory, self._params)
             if path is not None:
                 return Proposal(_cut(_joined(query.prefix_ne_m, path), self._params)), path
         return None, None
+
+
+def _with_hazards(query: Query, hits: NDArray[np.bool_]) -> tuple[GridMap, NDArray[np.bool_]]:
+    """The map as if what moves stood wherever it is about to be."""
+    cells, inside = cells_of(query.grid, query.hazard_ne_m)
+    if not inside.any():
+        return query.grid, hits
+    hit_ne_m = query.grid.hit_ne_m.copy()
+    hit_ne_m.reshape(-1, 2)[cells[inside]] = query.hazard_ne_m[inside]
+    hits.ravel()[cells[inside]] = True
+    return replace(query.grid, hit_ne_m=hit_ne_m), hits
 
 
 def _field(query: Query, clearance_m: F64, hard_m: float, params: ExpertParams) -> _Field:

@@ -16,6 +16,7 @@ class Query:
     state: VehicleState
     goal_ne_m: F64  # (2,)
     grid: GridMap
+    hazard_ne_m: F64  # (h, 2) what movers will sweep
     radius_m: float  # of the vehicle
     prefix_ne_m: F64  # (k, 2) already committed: ends where the new path has to begin, k = 1 is the vehicle's place
     observation: F64  # (72,)
