@@ -163,3 +163,4 @@ class Server:
     def _log_truth(self) -> None:
         if self._truth is not None:
             self._truth.write(self.sim.rows)
+        self.sim.rows.clear()

@@ -57,7 +57,7 @@ class Steering:
             self._task = self._task.end()
 
     def demand(self, behaviour: Behaviour, state: VehicleState, setpoint: TrajectorySetpoint | None) -> Demand:
-        """What to ask of the control loops now; CUT and an unbegun task of a landed vehicle are the caller's."""
+        """What to ask of the control loops now; idling on the ground is the caller's decision."""
         if behaviour is Behaviour.OFFBOARD and setpoint is not None:
             return self._follow(setpoint, state)
         if self._task is None:

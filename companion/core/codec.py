@@ -229,14 +229,14 @@ def quantise_scan(scan: Scan) -> Scan:
     wire = _SCAN_F32.pack(math.degrees(scan.increment_rad), math.degrees(scan.angle_offset_rad))
     increment_deg, offset_deg = _SCAN_F32.unpack(wire)
     count = _sector_count(increment_deg)
-    wire_cm = _wire_cm(scan.range_m, max_cm)
-    if len(wire_cm) != count:
-        padded = np.full(count, float(UNKNOWN_CM))
-        padded[: len(wire_cm)] = wire_cm[:count]
-        wire_cm = padded
+    range_m = _whole_cm_m(scan.range_m, max_cm)
+    if len(range_m) != count:
+        padded = np.full(count, math.nan)
+        padded[: len(range_m)] = range_m[:count]
+        range_m = padded
     return Scan(
         t_s=from_us(to_us(scan.t_s)),
-        range_m=_metres(wire_cm, max_cm),
+        range_m=range_m,
         angle_offset_rad=math.radians(offset_deg),
         increment_rad=math.radians(increment_deg),
         range_min_m=round(scan.range_min_m * 1e2) / 1e2,
@@ -261,6 +261,16 @@ def _wire_cm(range_m: F64, max_cm: int) -> F64:
     wire_cm[np.isinf(range_m)] = max_cm + 1
     wire_cm[np.isnan(range_m)] = UNKNOWN_CM
     return wire_cm
+
+
+def _whole_cm_m(range_m: F64, max_cm: int) -> F64:
+    """``_metres`` of ``_wire_cm`` in fewer steps: free stays inf, unknown NaN."""
+    whole_m: F64 = np.rint(range_m * 1e2)
+    np.minimum(whole_m, max_cm, out=whole_m)
+    np.maximum(whole_m, 0.0, out=whole_m)
+    whole_m /= 1e2
+    whole_m[np.isinf(range_m)] = math.inf
+    return whole_m
 
 
 def _metres(wire_cm: F64, max_cm: int) -> F64:
