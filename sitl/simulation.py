@@ -189,9 +189,12 @@ class Simulation:
         self.contact = self.contact or not clearance_m > 0.0
         north_m_s, east_m_s, down_m_s = self.truth.vel_ned_m_s.tolist()
         speed_m_s = math.hypot(north_m_s, east_m_s, down_m_s) + SPEED_SLACK_M_S + self._mover_m_s
-        free_steps = min(clearance_m / speed_m_s * 1e3 / STEP_MS, self.scan_steps)
+        free_steps = clearance_m / speed_m_s * 1e3 / STEP_MS
         to_scan = self.scan_steps - self._step % self.scan_steps
-        self._check_step = self._step + (to_scan if free_steps >= to_scan else max(1, int(free_steps)))
+        if free_steps >= to_scan:
+            self._check_step = self._step + to_scan
+        else:
+            self._check_step = self._step + (int(free_steps) if free_steps > 1.0 else 1)
 
     def _observe(self) -> Observation:
         ap = self.autopilot
