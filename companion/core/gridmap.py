@@ -12,7 +12,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d
 
 from companion.core.params import param
 from companion.core.types import F64
@@ -52,9 +51,9 @@ class PolarScan:
     t_s: float
     pos_ne_m: F64  # (2,)
     free_m: F64  # (AZIMUTH_BINS,) proven free this far; 0 where unknown
-    hit_bin: I32  # (h,) azimuth bins that lie in a sector with a hit
+    hit_bin: NDArray[np.intp]  # (h,) azimuth bins that lie in a sector with a hit
     hit_m: F64  # (h,) horizontal range of that sector's hit
-    hit_sector: I32  # (h,) sector of each, to treat an arc as one
+    hit_sector: NDArray[np.intp]  # (h,) sector of each, to treat an arc as one
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,10 +156,7 @@ def _shifted(cells: F32, di: int, dj: int, fill: np.float32) -> F32:
 def _certify(grid: GridMap, free_t: F32, hit_t: F32, scan: PolarScan, params: MapParams) -> None:
     """Mark every cell that lies inside the proven wedge, but for the tips of its corners (a fifth of a cell)."""
     table = _polar_table(params.cell_m, round(params.sense_m / params.cell_m))
-    free_m = (np.minimum(scan.free_m, params.sense_m) - params.noise_m).astype(np.float32)
-    eroded = np.empty((len(RING_M), AZIMUTH_BINS), np.float32)
-    for ring, half_width in enumerate(table.half_width_bins):
-        minimum_filter1d(free_m, 2 * half_width + 1, output=eroded[ring], mode="wrap")
+    eroded = _eroded((np.minimum(scan.free_m, params.sense_m) - params.noise_m).astype(np.float32), table)
     fine = scan.pos_ne_m / grid.cell_m
     cell = np.floor(fine).astype(int)
     sub = np.minimum(((fine - cell) * SUBCELLS).astype(int), SUBCELLS - 1)
@@ -171,6 +167,24 @@ def _certify(grid: GridMap, free_t: F32, hit_t: F32, scan: PolarScan, params: Ma
     certain = certain[part]
     np.maximum(free_t[window], certain * np.float32(scan.t_s), out=free_t[window])
     hit_t[window] *= 1.0 - certain
+
+
+def _eroded(free_m: F32, table: "_PolarTable") -> F32:
+    """(rings, bins) least proven range within the half width of each ring, widest first.
+
+    The minimum over h + k bins to either side is that over h bins, taken k bins to the left and to the right.
+    """
+    rings = np.empty((len(RING_M), AZIMUTH_BINS), np.float32)
+    pad = table.half_width_bins[0]
+    least = np.concatenate([free_m[-pad:], free_m, free_m[:pad]])
+    width = 0
+    for ring in range(len(RING_M) - 1, -1, -1):
+        while width < table.half_width_bins[ring]:
+            more = min(table.half_width_bins[ring] - width, 2 * width + 1)
+            least = np.minimum(least[2 * more :], least[: -2 * more])
+            width += more
+        rings[ring] = least[pad - width : pad - width + AZIMUTH_BINS]
+    return rings
 
 
 def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarScan, params: MapParams) -> F64:
@@ -185,7 +199,7 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     points = scan.pos_ne_m + AZIMUTH_DIR[scan.hit_bin[near]] * range_m[:, None]
     flat, inside = cells_of(grid, points)
     flat = np.where(inside, flat, 0)
-    possible = inside & (free_t.ravel()[flat] < np.float32(scan.t_s - params.certified_s))
+    possible = inside & (free_t.ravel()[flat] <= np.float32(max(scan.t_s - params.certified_s, 0.0)))
     open_arc = np.bincount(sector, possible) > 0
     paint = inside & (possible | ~open_arc[sector])
     cells = flat[paint]

@@ -15,7 +15,7 @@ from companion.guidance import follower
 from companion.navigator.memory import Engagement, Memory, Path
 from companion.navigator.params import Params
 from companion.perception.observation import observation
-from companion.perception.perceive import Percept
+from companion.perception.perceive import Percept, representatives
 from companion.policy.expert import ExpertParams, GeometricExpert
 from companion.policy.interface import Policy, Query
 
@@ -51,6 +51,7 @@ def decide(
 ) -> tuple[Memory, Engagement, Decision]:
     """Ask once; the accepted path, or None (brake and hold), goes into the engagement."""
     prefix = _prefix(engaged, state, params)
+    obstacles_ne_m = representatives(percept.bearing_range_m, state, params.perception.sense_radius_m)
     query = Query(
         state,
         task.goal_ned_m,
@@ -58,7 +59,7 @@ def decide(
         percept.hazard_ne_m,
         params.vehicle.radius_m,
         prefix,
-        observation(state, percept.obstacles_ne_m, engaged.start_ne_m, task.goal_ned_m),
+        observation(state, obstacles_ne_m, engaged.start_ne_m, task.goal_ned_m),
     )
     proposal, remembered = policy_named(params.policy.name, params).propose(query, memory.policy)
     memory = replace(memory, policy=remembered, decisions=memory.decisions + 1)

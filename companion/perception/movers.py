@@ -87,8 +87,7 @@ def hazards(tracks: tuple[Track, ...], params: MoverParams) -> F64:
     if not movers:
         return np.empty((0, 2))
     ahead = np.linspace(0.0, params.ahead_s, params.steps)[:, None]
-    centres = np.concatenate([t.pos_ne_m + ahead * t.vel_ne_m_s for t in movers])
-    return centres
+    return np.concatenate([t.pos_ne_m + ahead * t.vel_ne_m_s for t in movers])
 
 
 def discs(centres_ne_m: F64, params: MoverParams) -> F64:

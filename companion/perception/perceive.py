@@ -10,7 +10,7 @@ from companion.core.geometry import swept_free_length
 from companion.core.gridmap import GridMap, MapParams, occupied_points, update
 from companion.core.inputs import Inputs
 from companion.core.params import param
-from companion.core.types import F64
+from companion.core.types import F64, VehicleState
 from companion.perception.movers import MoverParams, Track, avoidable, discs, follow, hazards
 from companion.perception.observation import nearest_representatives
 from companion.perception.polar import BEARING_RAD, flatten
@@ -47,7 +47,7 @@ class Percept:
     static_ne_m: F64  # (k, 2) remembered hits
     hazard_ne_m: F64  # (h, 2) what movers will sweep within the look-ahead
     points_ne_m: F64  # (p, 2) hits, and hazards that do not hold the vehicle already: what no path may touch
-    obstacles_ne_m: F64  # (<= 20, 2) nearest representatives of this scan
+    bearing_range_m: F64  # (72,) of this scan, at fixed bearings off the nose
     d_min_m: float  # inf when nothing is within the sensing radius
     s_fuzzy: float
     density: float
@@ -93,7 +93,7 @@ def perceive(
         static,
         discs(swept, mover_params),
         points,
-        _representatives(flat.bearing_range_m, inputs, params.sense_radius_m),
+        flat.bearing_range_m,
         d_min if d_min <= params.sense_radius_m else math.inf,
         score,
         density,
@@ -119,10 +119,10 @@ def line_of_sight(pos_ne_m: F64, goal_ne_m: F64, points_ne_m: F64, radius_m: flo
     return swept_free_length(ray, points_ne_m, radius_m + params.sight_margin_m) >= reach - 1e-9
 
 
-def _representatives(bearing_range_m: F64, inputs: Inputs, radius_m: float) -> F64:
-    """One point per fixed bearing with a hit, nearest twenty first."""
-    pos = inputs.state.pos_ned_m[:2]
+def representatives(bearing_range_m: F64, state: VehicleState, radius_m: float) -> F64:
+    """(<= 20, 2) one point per fixed bearing with a hit, the nearest first."""
+    pos = state.pos_ned_m[:2]
     hit = np.isfinite(bearing_range_m)
-    azimuth = BEARING_RAD[hit] + yaw_rad(inputs.state.q_ned_frd)
+    azimuth = BEARING_RAD[hit] + yaw_rad(state.q_ned_frd)
     points = pos + np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1) * bearing_range_m[hit][:, None]
     return nearest_representatives(points, pos, radius_m)

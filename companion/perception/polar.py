@@ -43,12 +43,14 @@ def flatten(scan: Scan, state: VehicleState, lidar_up_m: float, ground_margin_m:
         scan, rotation, _trusted_height_m(lidar_up_m - float(state.pos_ned_m[2]), ground_margin_m)
     )
     hit = scan.range_m < ground_m  # false for nan and inf as well: inf < inf
-    proven_m = np.nan_to_num(np.minimum(np.minimum(scan.range_m, scan.range_max_m), ground_m), nan=0.0)
+    known = ~np.isnan(scan.range_m)
+    proven_m = np.where(known, np.minimum(np.minimum(scan.range_m, scan.range_max_m), ground_m), 0.0)
 
-    body = AZIMUTH_DIR @ np.linalg.inv(rotation[:2, :2]).T  # azimuth directions seen in the body plane, not normalised
-    stretch = 1.0 / np.sqrt(np.einsum("ij,ij->i", body, body))  # |P (cos b, sin b)|: horizontal metres per slant metre
-    sector = _sector_of(np.arctan2(body[:, 1], body[:, 0]), scan)
-    bins = np.flatnonzero(hit.take(sector)).astype(np.int32)
+    forward, right = _in_body_plane(rotation)
+    stretch = 1.0 / np.hypot(forward, right)  # |P (cos b, sin b)|: horizontal metres per slant metre
+    sector = _sector_of(np.arctan2(right, forward), scan)
+    bin_hit = hit.take(sector)
+    bins = np.flatnonzero(bin_hit)
     horizontal_m = scan.range_m.take(sector) * stretch
     polar = PolarScan(
         t_s=scan.t_s,
@@ -56,10 +58,20 @@ def flatten(scan: Scan, state: VehicleState, lidar_up_m: float, ground_margin_m:
         free_m=proven_m.take(sector) * stretch,
         hit_bin=bins,
         hit_m=horizontal_m[bins],
-        hit_sector=sector[bins].astype(np.int32),
+        hit_sector=sector[bins],
     )
-    nothing = np.where(np.isnan(scan.range_m), np.nan, np.inf).take(sector)
-    return Flattened(polar, _at_bearings(np.where(hit.take(sector), horizontal_m, nothing), rotation))
+    nothing_m = np.where(known, np.inf, np.nan).take(sector)
+    return Flattened(polar, _at_bearings(np.where(bin_hit, horizontal_m, nothing_m), rotation))
+
+
+def _in_body_plane(rotation: F64) -> tuple[F64, F64]:
+    """The azimuth directions seen in the body plane, not normalised: P inverted and applied."""
+    (a, b), (c, d) = rotation[:2, :2].tolist()
+    determinant = a * d - b * c
+    north, east = AZIMUTH_DIR[:, 0], AZIMUTH_DIR[:, 1]
+    forward: F64 = (d * north - b * east) / determinant
+    right: F64 = (a * east - c * north) / determinant
+    return forward, right
 
 
 def _sector_of(bearing_rad: F64, scan: Scan) -> NDArray[np.intp]:
