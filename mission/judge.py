@@ -100,7 +100,7 @@ def measure(truth: TruthLog, goal_ned_m: F64) -> Flown:
     landed = bool(len(track)) and truth.landed[-1] == LandedState.ON_GROUND and not truth.armed[-1]
     airborne = truth.clearance_m[truth.landed != LandedState.ON_GROUND]
     return Flown(
-        time_s=float(truth.t_s[window][-1] - truth.t_s[window][0]) if len(track) else 0.0,
+        time_s=round(float(truth.t_s[window][-1] - truth.t_s[window][0]), 3) if len(track) else 0.0,
         path_m=float(np.hypot(*np.diff(track, axis=0).T).sum()) if len(track) else 0.0,
         began_ned_m=track[0] if len(track) else None,
         min_clearance_m=float(np.min(airborne, initial=math.inf)),
