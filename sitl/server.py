@@ -68,7 +68,8 @@ class Server:
     def run(self, stopped: Callable[[], bool]) -> None:
         """Until ``stopped()``."""
         while not stopped():
-            self._serve(0.0)
+            if self._ahead is None:
+                self._serve(0.0)
             if self._ahead is None and self._stands():
                 self._pacer.restart()
                 self._serve(POLL_WALL_S)
@@ -85,18 +86,18 @@ class Server:
             self._truth.flush()
 
     def _serve(self, timeout_s: float) -> None:
-        """Wait for messages at most ``timeout_s``, act on them, send what is due."""
+        """Send what is due, then wait for messages at most ``timeout_s`` and act on them."""
+        now_s = self._clock.now_s()
+        self._voice.stream_by_wall(round(now_s * 1e6))
+        if now_s - self._flush_s > FLUSH_WALL_S:
+            self._flush_s = now_s
+            self.flush()
         if timeout_s > 0.0:
             wait_readable(self._transports, timeout_s, self._clock)
         for link in self._links:
             for message in link.connection.receive():
                 self._router.handle(link, message)
         self._voice.tell_changes()
-        now_s = self._clock.now_s()
-        self._voice.stream_by_wall(round(now_s * 1e6))
-        if now_s - self._flush_s > FLUSH_WALL_S:
-            self._flush_s = now_s
-            self.flush()
 
     def _stands(self) -> bool:
         """Does vehicle time stand still? At a gate, and after a flight in lockstep: there is nothing to answer."""
