@@ -6,8 +6,9 @@ from typing import Any
 
 from companion.core.inputs import Inputs
 from companion.core.types import F64, Setpoint
+from companion.guidance.line import LineErrors, slope_intercept
 from companion.navigator.decide import Decision
-from companion.navigator.memory import Memory
+from companion.navigator.memory import Engagement, Memory
 from companion.navigator.track import Tracked
 from companion.perception.perceive import Percept
 
@@ -21,11 +22,13 @@ class Record:
     inputs: Inputs
     percept: Percept
     memory: Memory  # after the tick
-    tracked: Tracked | None
-    decision: Decision | None
     setpoint: Setpoint
     goal_distance_m: float
-    switches_bound: int
+    switches_bound: int = 0
+    tracked: Tracked | None = None
+    decision: Decision | None = None
+    line_errors: LineErrors | None = None  # against the line of the present or last Travel
+    touchdown: bool = False  # eq. land_terminate held for T_settle
 
     @property
     def mode(self) -> str:
@@ -61,6 +64,10 @@ class Record:
             "speed_m_s": self.tracked.speed_m_s if self.tracked else None,
             "free_m": _number(self.tracked.free_m) if self.tracked else None,
             "lateral_m": _number(self.tracked.lateral_m) if self.tracked else None,
+            "cross_track_m": _number(self.line_errors.cross_track_m) if self.line_errors else None,
+            "heading_error_rad": _number(self.line_errors.heading_rad) if self.line_errors else None,
+            "line_kb": _line_kb(engaged),
+            "touchdown": self.touchdown,
             "sp_pos_ned_m": _list(self.setpoint.pos_ned_m),
             "sp_vel_ned_m_s": _list(self.setpoint.vel_ned_m_s),
             "sp_acc_ned_m_s2": _list(self.setpoint.acc_ned_m_s2),
@@ -69,6 +76,12 @@ class Record:
         if self.decision is not None:
             row |= _decided(self.decision)
         return row
+
+
+def _line_kb(engaged: Engagement | None) -> list[float] | None:
+    """Slope and intercept of the frozen line (eq. line_kb); null while standing by or where it runs east or west."""
+    kb = slope_intercept(engaged.line) if engaged else None
+    return None if kb is None else list(kb)
 
 
 def _decided(decision: Decision) -> dict[str, Any]:

@@ -47,6 +47,7 @@ class _Steered:
     setpoint: Setpoint
     tracked: Tracked | None = None
     decision: Decision | None = None
+    touchdown: bool = False
 
 
 def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Memory, Setpoint, Record]:
@@ -76,7 +77,7 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
     goal_m = _goal_distance(state, task)
     if not (inputs.status.offboard and inputs.status.armed):
         memory, setpoint = _standby(memory, state)
-        return memory, setpoint, Record(inputs, percept, memory, None, None, setpoint, goal_m, 0)
+        return memory, setpoint, Record(inputs, percept, memory, setpoint, goal_m)
     engaged = memory.engaged or _engage(state, task)
     facts = _facts(inputs, percept, engaged, goal_m)
     scene = _Scene(state, percept, task, params, _thresholds(percept, params), facts, dt_s)
@@ -86,7 +87,18 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
     memory = replace(steered.memory, engaged=steered.engaged, yaw_sp_rad=yaw_sp)
     flown_s = steered.engaged.arbiter.t_s - engaged.engaged_t_s
     bound = arbiter.switch_bound(flown_s, params.arbiter, steered.engaged.arbiter.aborts)
-    record = Record(inputs, percept, memory, steered.tracked, steered.decision, steered.setpoint, goal_m, bound)
+    record = Record(
+        inputs,
+        percept,
+        memory,
+        steered.setpoint,
+        goal_m,
+        bound,
+        steered.tracked,
+        steered.decision,
+        line.errors(steered.engaged.line, state.pos_ned_m[:2], yaw_rad(state.q_ned_frd)),
+        steered.touchdown,
+    )
     return memory, steered.setpoint, record
 
 
@@ -193,8 +205,12 @@ def _land(memory: Memory, engaged: Engagement, scene: _Scene) -> _Steered:
     assert engaged.landing is not None  # set on entry, cleared on exit
     safe = landing_safe(scene.facts, scene.limits)
     began, command = landing.step(engaged.landing, scene.state, safe, scene.params.landing)
-    setpoint = Setpoint(scene.state.t_s, command.pos_ned_m, command.vel_ned_m_s, command.acc_ned_m_s2, command.yaw_rad)
-    return _Steered(memory, replace(engaged, landing=began, stop=None), setpoint)
+    if _must_stop(scene):
+        return _held(memory, replace(engaged, landing=began), scene)
+    yaw = turned(memory.yaw_sp_rad, command.yaw_rad, scene.dt_s, scene.params.vehicle.yaw_rate_rad_s)
+    setpoint = Setpoint(scene.state.t_s, command.pos_ned_m, command.vel_ned_m_s, command.acc_ned_m_s2, yaw)
+    engaged = replace(engaged, landing=began, stop=None)
+    return _Steered(memory, engaged, setpoint, touchdown=command.touchdown)
 
 
 def _must_stop(scene: _Scene) -> bool:
