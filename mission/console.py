@@ -114,7 +114,9 @@ class FlightConsole:
                 *(Text.assemble((f"{label} ", "dim"), value) for label, value in _figures(row)),
             ]
             table.add_row(*cells)
-            body += [table, ProgressBar(total=1.0, completed=self._progress(row), width=60)]
+            bar = Table.grid(padding=(0, 1))
+            bar.add_row(ProgressBar(completed=100.0 * self._progress(row), width=60), f"{self._progress(row):4.0%}")
+            body += [table, bar]
         body += [Text(event, style="dim") for event in self._events]
         return Panel(Group(*body), title=self._title, title_align="left", border_style="dim", width=100)
 
