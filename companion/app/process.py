@@ -52,6 +52,7 @@ class Companion:
         """``links``: the vehicle's connection, then the LiDAR's if it has its own."""
         self.exit_code: int | None = None
         self.reason = ""
+        self.skipped_scans = 0  # overtaken by a newer one before they could be answered
         self.on_status: OnStatus | None = None
         self.say: Say = _silent
         self._config = config
@@ -69,6 +70,7 @@ class Companion:
         self._heartbeat_s = now_s - HEARTBEAT_S
         self._status_s = now_s
         self._status: StatusLine | None = None
+        self._pending: tuple[Inputs, float] | None = None  # the newest scan, and when it arrived
         self._held_t_s = 0.0  # vehicle time of the last hold setpoint
         self._first_state_s: float | None = None
         self._hinted = False
@@ -86,6 +88,7 @@ class Companion:
             for message in link.receive():
                 if self.exit_code is None:
                     self._handle(message, arrived_s)
+        self._take_pending()
         now_s = self._clock.now_s()
         if self.exit_code is None and stop is not None and stop.number is not None:
             self._stop(stop, now_s)
@@ -102,7 +105,8 @@ class Companion:
         if message.get_srcSystem() == system and message.get_srcComponent() == codec.VEHICLE_COMPONENT:
             self._heard(arrived_s)
         if inputs is not None:
-            self._take(inputs, arrived_s)
+            self.skipped_scans += self._pending is not None
+            self._pending = inputs, arrived_s
         elif message.get_msgId() == mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
             self._watch_scans()
         elif message.get_msgId() == mav.MAVLINK_MSG_ID_COMMAND_ACK:
@@ -116,6 +120,13 @@ class Companion:
             self._heartbeat_s = now_s - HEARTBEAT_S  # introduce ourselves at once
             self._tell(f"vehicle {system} heard on {self._vehicle.transport.name}")
         self._watch.heard_s = now_s
+
+    def _take_pending(self) -> None:
+        """Only the newest scan of a batch is answered: one who falls behind must not fly on old news."""
+        if self._pending is not None and self.exit_code is None:
+            inputs, arrived_s = self._pending
+            self._pending = None
+            self._take(inputs, arrived_s)
 
     def _take(self, inputs: Inputs, arrived_s: float) -> None:
         """Answer a scan."""

@@ -76,7 +76,12 @@ def _ended(
     assert companion.exit_code is not None
     summary = Summary(companion.exit_code, companion.reason, logs.ticks, logs.record_sha256, str(config.log_dir))
     counts = {link.transport.name: dataclasses.asdict(link.counts) for link in links}
-    facts = {"links": counts, "dropped_scans": companion.dropped_scans, "max_rss_mb": peak_rss_mb()}
+    facts = {
+        "links": counts,
+        "dropped_scans": companion.dropped_scans,
+        "skipped_scans": companion.skipped_scans,
+        "max_rss_mb": peak_rss_mb(),
+    }
     logs.event("end", **facts, **dataclasses.asdict(summary))
     logs.close()
     if logs.problem is not None:

@@ -391,3 +391,16 @@ def test_a_disk_that_fills_up_ends_the_logs_and_not_the_flight(tmp_path: Path) -
     bench.logs.close()
     assert bench.logs.problem is not None
     assert "No space left" in bench.logs.problem
+
+
+def test_one_who_falls_behind_answers_the_newest_scan_only(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.run(1.0)
+    answered = len(bench.brain.ticks)
+    for _ in range(10):  # the vehicle flies on while the companion is busy elsewhere
+        bench.vehicle.step()
+    scans = bench.vehicle.t_s
+    bench.companion.turn(bench.stop, 0.0)
+    assert len(bench.brain.ticks) == answered + 1
+    assert bench.companion.skipped_scans > 0
+    assert scans - bench.brain.ticks[-1].scan.t_s < 0.1
