@@ -37,13 +37,12 @@ def companion(arguments: list[str]) -> int:
 
 def _take_mission(given: argparse.Namespace) -> Params:
     """Fill in the goal, relative to where the mission starts, and the cruise speed; the mission's parameters."""
-    from mission.flight_plan import mission_params
+    from mission.flight_plan import mission_params, mission_world
     from mission.mission_file import load_mission
-    from mission.world_file import load_world
 
     mission = load_mission(given.mission)
     tuned = mission_params(mission)
-    world = load_world(mission.world, mission.start, mission.goal, tuned.vehicle.radius_m)
+    world = mission_world(mission, given.seed, tuned.vehicle.radius_m)
     given.goal = (world.goal_ned_m - world.start_ned_m).tolist()
     if mission.down_m is not None:
         given.goal.append(mission.down_m)

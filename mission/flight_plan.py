@@ -3,6 +3,7 @@
 Every draw comes from ``numpy.random.SeedSequence(seed)``, one child per purpose, so a new draw moves no other one.
 """
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -15,10 +16,11 @@ from companion.core.task import Task
 from companion.core.types import F64
 from companion.navigator.params import Params
 from mission.errors import InputError
-from mission.mission_file import Mission, load_mission
+from mission.mission_file import ForestSpec, Mission, load_mission
 from mission.strict_yaml import checked
-from mission.world_check import clearance_m
+from mission.world_check import check_world, clearance_m
 from mission.world_file import load_world
+from mission.world_generator import generate_forest
 from sitl.world import World
 
 SPAWN_CLEARANCE_M = 0.5  # beyond the radius: take-off in wind drifts
@@ -58,21 +60,38 @@ def plan_flight(
 ) -> FlightPlan:
     """Check everything and draw. Raises InputError or ParamError with one line."""
     mission = load_mission(name_or_path)
-    for key, value in (("world", world), ("policy", policy)):
-        if value is not None:
-            mission = checked(Mission, {**mission.model_dump(), key: value}, f"--{key}")
+    if world is not None:
+        mission = checked(Mission, {**mission.model_dump(), "world": world, "forest": None}, "--world")
+    if policy is not None:
+        mission = checked(Mission, {**mission.model_dump(), "policy": policy}, "--policy")
     return plan_mission(mission, seed, overrides)
 
 
 def plan_mission(mission: Mission, seed: int, overrides: dict[str, dict[str, Any]] | None = None) -> FlightPlan:
     """``plan_flight`` for a mission that is already loaded."""
     params = mission_params(mission, overrides)
-    surroundings = load_world(mission.world, mission.start, mission.goal, params.vehicle.radius_m)
+    surroundings = mission_world(mission, seed, params.vehicle.radius_m)
     draws = draw(mission, surroundings, seed, params.vehicle.radius_m)
     offset_ned_m = (surroundings.goal_ned_m - np.array(draws.spawn_ned_m)).tolist()
     goal_ned_m: F64 = np.array([round(metres, DECIMALS) for metres in offset_ned_m])
     task = Task(goal_ned_m, mission.down_m, mission.cruise_m_s)
     return FlightPlan(mission, surroundings.seeded(draws.mover_seed), params, seed, draws, task)
+
+
+def mission_world(mission: Mission, seed: int, radius_m: float) -> World:
+    """The mission's world with its start and goal, checked for a way; movers not yet seeded. Raises InputError."""
+    if mission.world is not None:
+        return load_world(mission.world, mission.start, mission.goal, radius_m)
+    forest = mission.forest or ForestSpec()
+    world_seed = seed if forest.seed is None else forest.seed
+    world = generate_forest(
+        world_seed, forest.density_per_m2, forest.size_m, forest.trunk_diameter_m, radius_m=radius_m
+    )
+    start_ned_m = world.start_ned_m if mission.start is None else np.array(mission.start)
+    goal_ned_m = world.goal_ned_m if mission.goal is None else np.array(mission.goal)
+    world = dataclasses.replace(world, start_ned_m=start_ned_m, goal_ned_m=goal_ned_m)
+    check_world(world, radius_m)
+    return world
 
 
 def mission_params(mission: Mission, overrides: dict[str, dict[str, Any]] | None = None) -> Params:

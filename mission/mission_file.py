@@ -51,12 +51,22 @@ class Success(StrictModel):
     landing_error_m: Real = Field(default=0.5, gt=0.0, le=100.0)  # horizontal, touchdown to goal
 
 
+class ForestSpec(StrictModel):
+    """A world that the seed of the flight draws: trunks at random, start and goal on the long axis."""
+
+    density_per_m2: Real = Field(default=0.05, ge=0.0, le=1.0)
+    size_m: tuple[Real, Real] = (60.0, 40.0)  # north, east
+    trunk_diameter_m: Real = Field(default=0.6, gt=0.0, le=10.0)
+    seed: int | None = Field(default=None, ge=0)  # null: the flight's
+
+
 class Mission(StrictModel):
     """One mission; ``None`` for start and goal means the world's own."""
 
     name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_.-]+$")
     text: str = ""
-    world: str
+    world: str | None = None  # a name or a file; or else:
+    forest: ForestSpec | None = None
     start: tuple[Real, Real] | None = None
     goal: tuple[Real, Real] | None = None
     down_m: Real | None = Field(
@@ -71,6 +81,12 @@ class Mission(StrictModel):
     policy: str = "geometric"
     success: Success
     params: dict[str, dict[str, Any]] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _one_world(self) -> "Mission":
+        if (self.world is None) == (self.forest is None):
+            raise ValueError("wants either 'world' or 'forest'")
+        return self
 
     @field_validator("policy")
     @classmethod
@@ -106,9 +122,9 @@ def _from_yaml(path: Path) -> Mission:
     data = read_yaml(path)
     data.setdefault("name", path.stem)
     mission = checked(Mission, data, str(path))
-    beside = path.parent / mission.world
-    if Path(mission.world).suffix and not Path(mission.world).is_absolute() and beside.is_file():
-        return mission.model_copy(update={"world": str(beside)})  # a world file is found from where the mission lies
+    world = mission.world
+    if world is not None and Path(world).suffix and (path.parent / world).is_file():
+        return mission.model_copy(update={"world": str(path.parent / world)})  # as seen from where the mission lies
     return mission
 
 

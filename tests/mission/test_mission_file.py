@@ -56,6 +56,7 @@ def test_a_yaml_file_is_read_as_written(tmp_path: Path) -> None:
         ("2.5", "-1", "greater than or equal to 0.3"),
         ("2.5", "'2.5'", "valid number"),
         ("[30, 5]", "[30]", "'goal.1'"),
+        ("world: open", "text: nowhere", "either 'world' or 'forest'"),
         ("[30, 5]", "[30, .inf]", "finite"),
         ("[0.0, 2.0]", "[3.0, 2.0]", "low <= high"),
         ("{time_limit_s: 40}", "{}", "key 'success.time_limit_s' is missing"),
