@@ -33,3 +33,15 @@ class Origin:
     def down_m(self, alt_amsl_m: float) -> float:
         """Local ``down_m`` of an altitude above mean sea level."""
         return self.alt_amsl_m - alt_amsl_m
+
+    def north_east_m(self, lat_deg: float, lon_deg: float) -> tuple[float, float]:
+        """Local position of a latitude and longitude: the inverse of ``lat_lon_deg``."""
+        lat0, lat = math.radians(self.lat_deg), math.radians(lat_deg)
+        turn = math.radians(lon_deg - self.lon_deg)
+        cos_arc = math.sin(lat0) * math.sin(lat) + math.cos(lat0) * math.cos(lat) * math.cos(turn)
+        north = math.cos(lat0) * math.sin(lat) - math.sin(lat0) * math.cos(lat) * math.cos(turn)
+        east = math.cos(lat) * math.sin(turn)
+        sin_arc = math.hypot(north, east)
+        arc = math.atan2(sin_arc, cos_arc)
+        scale_m = EARTH_RADIUS_M * (arc / sin_arc if sin_arc > 0.0 else 1.0)
+        return north * scale_m, east * scale_m

@@ -10,9 +10,10 @@ from typing import Any, Final
 from pymavlink.dialects.v20 import common as mav
 
 from companion.core.frames import yaw_rad
-from sitl import commands, param_protocol, setpoints
+from sitl import command, commands, param_protocol, setpoints
 from sitl.answers import CRITICAL, StatusText
-from sitl.commands import ANYBODY, Command
+from sitl.command import Command
+from sitl.commands import ANYBODY
 from sitl.link import COMPONENT, Link
 from sitl.simulation import STEP_MS, Simulation
 
@@ -54,21 +55,21 @@ class Router:
         self.companion_heard = self.companion_heard or link.companion
 
     def _command_long(self, link: Link, message: Message) -> None:
-        self._execute(link, message, commands.from_long(message), message.target_component)
+        self._execute(link, message, command.from_long(message), message.target_component)
 
     def _command_int(self, link: Link, message: Message) -> None:
-        self._execute(link, message, commands.from_int(message), message.target_component)
+        self._execute(link, message, command.from_int(message), message.target_component)
 
     def _set_mode(self, link: Link, message: Message) -> None:
-        self._execute(link, message, commands.from_set_mode(message), COMPONENT)
+        self._execute(link, message, command.from_set_mode(message), COMPONENT)
 
-    def _execute(self, link: Link, message: Message, command: Command, component: int) -> None:
-        to_all = command.id in ANYBODY and message.target_system == 0
+    def _execute(self, link: Link, message: Message, asked: Command, component: int) -> None:
+        to_all = asked.id in ANYBODY and message.target_system == 0
         if not (to_all or message.target_system == self._system_id) or component not in (0, COMPONENT):
             return
-        answer = commands.execute(command, self._sim, link)
+        answer = commands.execute(asked, self._sim, link)
         ack = mav.MAVLink_command_ack_message(
-            command.id, answer.result, 0, 0, message.get_srcSystem(), message.get_srcComponent()
+            asked.id, answer.result, 0, 0, message.get_srcSystem(), message.get_srcComponent()
         )
         link.connection.send(*answer.messages, ack)
 
