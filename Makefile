@@ -1,22 +1,40 @@
 # SWIFT-Nav: `make fly` and `make test` do all their own set-up.
-PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help setup fly test slow check format bench clean
+# The first of these that is Python 3.11 or 3.12 and can make a virtual environment; PYTHON=... comes before them.
+PYTHON ?=
+FIND_PYTHON = python=; for p in $(PYTHON) python3.11 python3.12 python3; do \
+	$$p -c 'import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))' 2>/dev/null \
+	&& python=$$p && break; done
+DEBIAN_PACKAGES := python3 python3-venv
+
+.PHONY: help setup fly test slow check format docs bench image clean
 help:
-	@echo "make fly     set up and fly trajectory 2"
+	@echo "make fly     set up and fly trajectory 2; ARGS='trajectory1 --seed 3 --speed 1' for another flight"
 	@echo "make test    set up, check and test: everything CI runs"
 	@echo "make setup   create .venv and install everything for development"
 	@echo "make check   format, lint, types, floors"
-	@echo "make slow    the long flight tables (50 seeds a world)"
+	@echo "make format  put files into the house format"
+	@echo "make docs    write docs/parameters.md from the code"
+	@echo "make slow    the long flight tests"
 	@echo "make bench   speed as ratios to bare JSBSim"
+	@echo "make image   container of the companion (needs docker)"
+	@echo "make clean   remove .venv and caches"
 
 $(BIN)/python:
-	@command -v $(PYTHON) >/dev/null || { echo "need $(PYTHON): on Debian 'apt-get install python3.11 python3.11-venv'"; exit 1; }
-	$(PYTHON) -m venv $(VENV)
+	@$(FIND_PYTHON); \
+	if [ -z "$$python" ] && [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+		apt-get update -q && apt-get install -qy --no-install-recommends $(DEBIAN_PACKAGES); $(FIND_PYTHON); \
+	fi; \
+	if [ -z "$$python" ]; then \
+		echo "SWIFT-Nav needs Python 3.11 or 3.12 with venv: 'apt-get install $(DEBIAN_PACKAGES)' on Debian 12" >&2; \
+		echo "or Ubuntu 24.04, 'brew install python@3.12' on macOS, or name one: make PYTHON=/path/to/python3.12" >&2; \
+		exit 1; \
+	fi; \
+	"$$python" -m venv $(VENV)
 
 # `fly` needs the companion and the vehicle; `dev` adds the test tools. Neither needs torch.
 $(VENV)/.sitl: $(BIN)/python pyproject.toml constraints.txt
@@ -47,8 +65,14 @@ test: check
 slow: $(VENV)/.dev
 	$(BIN)/pytest -n 2 -m slow --timeout 3600
 
+docs: $(VENV)/.sitl
+	$(BIN)/swiftnav params docs > docs/parameters.md
+
 bench: $(VENV)/.sitl
 	$(BIN)/swiftnav bench speed
 
+image:
+	docker build -f docker/companion.Dockerfile -t swiftnav-companion .
+
 clean:
-	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
