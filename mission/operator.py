@@ -49,6 +49,7 @@ class OperatorConfig:
     takeoff_wall_s: float = 60.0
     offboard_wall_s: float = 20.0
     stuck_wall_s: float = 10.0  # without vehicle time going on
+    left_wall_s: float = 1.0  # out of OFFBOARD: a failsafe may end by itself, a pilot keeps the vehicle
 
 
 async def fly(config: OperatorConfig, say: Say) -> None:
@@ -113,7 +114,7 @@ async def _watch(config: OperatorConfig, watch: TelemetryWatch, say: Say) -> Non
             raise OperatorError("the vehicle was lost in flight")
         if time.monotonic() - max(watch.moved_wall_s, began_wall_s) > config.stuck_wall_s:
             raise OperatorError(f"vehicle time stood still for {config.stuck_wall_s:g} s")
-        if watch.mode not in ("OFFBOARD", "LAND", "UNKNOWN"):
+        if not await watch.until(lambda: watch.mode == "OFFBOARD" or not watch.armed, config.left_wall_s):
             raise OperatorError(f"the vehicle left OFFBOARD for {watch.mode}")
         if watch.t_s - start_s > config.time_limit_s:
             raise OperatorError(f"time limit of {config.time_limit_s:g} s reached")

@@ -4,11 +4,13 @@ import hashlib
 import json
 import os
 import signal
+import socket
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import common as mavlink
 
 from companion.app.logs import record_line
 from companion.core.tlog import read_tlog
@@ -112,8 +114,20 @@ def test_the_time_limit_counts_vehicle_time_and_ends_in_hold(tmp_path: Path, ins
 
 
 def test_the_companion_is_told_exactly_the_goal_of_the_plan(tmp_path: Path) -> None:
-    for seed in range(50):
+    for seed in range(10):
         plan = plan_flight("trajectory2", seed)
         words = companion_arguments(plan, FlySettings(), tmp_path)
         goal = words[words.index("--goal") + 1 : words.index("--cruise")]
         assert [float(word) for word in goal] == plan.task.goal_ned_m.tolist()
+
+
+def test_a_pilot_who_takes_the_mode_has_the_vehicle(tmp_path: Path, instance: int) -> None:
+    def flip() -> None:
+        """From the ground station's link."""
+        station = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+        hold = station.command_long_encode(1, 1, mavlink.MAV_CMD_DO_SET_MODE, 0, 1, 4, 3, 0, 0, 0, 0)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+            udp.sendto(hold.pack(station), ("127.0.0.1", 18570 + instance))
+
+    result = fly(plan_flight("trajectory1", seed=5), tmp_path, instance, flip)
+    assert (result.success, result.reason) == (False, "the vehicle left OFFBOARD for HOLD")
