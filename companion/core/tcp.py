@@ -1,29 +1,40 @@
 """How do bytes travel over TCP? IPv4; listens for any number of clients (``tcpin``) or connects to one (``tcpout``).
 
-A lost connection is silence; ``tcpin`` takes the next client, ``tcpout`` stays silent.
+A lost connection is silence; ``tcpin`` takes the next client, ``tcpout`` calls again until somebody answers.
 """
 
 import contextlib
 import errno
+import math
 import socket
 from collections.abc import Sequence
 
+from companion.core.clock import Clock, SystemClock
 from companion.core.transport import Selectable, TransportError
 from companion.core.udp import bind_problem
 
 CONNECT_TIMEOUT_S = 3.0
+CALL_AGAIN_S = 0.5  # between two attempts to get a lost server back
 CHUNK_BYTES = 65536
 UNSENT_MAX_BYTES = 1 << 20  # a client that does not read this much is dropped
 BACKLOG = 8
+UNDER_WAY = (errno.EINPROGRESS, errno.EALREADY, errno.EINTR, errno.EWOULDBLOCK)
 
 
 class Tcp:
-    """A set of stream connections that hear the same; behind a listener, or a single one."""
+    """A set of stream connections that hear the same; behind a listener, or a single one that is made again."""
 
-    def __init__(self, name: str, listener: socket.socket | None, streams: list["_Stream"]) -> None:
+    def __init__(
+        self,
+        name: str,
+        listener: socket.socket | None = None,
+        streams: list["_Stream"] | None = None,
+        caller: "_Caller | None" = None,
+    ) -> None:
         self._name = name
         self._listener = listener
-        self._streams = streams
+        self._streams = streams or []
+        self._caller = caller
 
     @property
     def name(self) -> str:
@@ -37,14 +48,14 @@ class Tcp:
 
     def send(self, data: bytes) -> None:
         """To every open connection."""
-        self._accept()
+        self._renew()
         for stream in self._streams:
             stream.send(data)
         self._drop_closed()
 
     def receive(self) -> list[bytes]:
         """What arrived on every connection."""
-        self._accept()
+        self._renew()
         chunks = [chunk for stream in self._streams for chunk in stream.receive()]
         self._drop_closed()
         return chunks
@@ -66,8 +77,15 @@ class Tcp:
         if self._listener is not None:
             self._listener.close()
             self._listener = None
+        if self._caller is not None:
+            self._caller.close()
+            self._caller = None
 
-    def _accept(self) -> None:
+    def _renew(self) -> None:
+        """Take new clients, or get the lost server back."""
+        if self._caller is not None and not self._streams:
+            connected = self._caller.connected()
+            self._streams = [_Stream(connected)] if connected is not None else []
         while self._listener is not None:
             try:
                 client, _ = self._listener.accept()
@@ -90,17 +108,58 @@ def tcp_in(host: str, port: int) -> Tcp:
         listener.close()
         raise TransportError(bind_problem("tcp", host, port, error)) from error
     listener.setblocking(False)
-    return Tcp(f"tcpin://{host}:{port}", listener, [])
+    return Tcp(f"tcpin://{host}:{port}", listener)
 
 
-def tcp_out(host: str, port: int) -> Tcp:
-    """Connect to ``host:port``. Raises TransportError when nobody listens there."""
+def tcp_out(host: str, port: int, clock: Clock | None = None) -> Tcp:
+    """Connect to ``host:port``. Raises TransportError when nobody listens there now; later losses are made good."""
     try:
         stream = socket.create_connection((host, port), CONNECT_TIMEOUT_S)
     except OSError as error:
         reason = "nobody listens there" if error.errno == errno.ECONNREFUSED else str(error.strerror or error)
         raise TransportError(f"tcp {host}:{port} cannot be reached: {reason}") from error
-    return Tcp(f"tcpout://{host}:{port}", None, [_Stream(stream)])
+    address = stream.getpeername()
+    return Tcp(f"tcpout://{host}:{port}", None, [_Stream(stream)], _Caller(address, clock or SystemClock()))
+
+
+class _Caller:
+    """Connects again without ever waiting: one attempt at a time, each given up after a while."""
+
+    def __init__(self, address: tuple[str, int], clock: Clock) -> None:
+        self._address = address
+        self._clock = clock
+        self._attempt: socket.socket | None = None
+        self._began_s = -math.inf
+
+    def connected(self) -> socket.socket | None:
+        """The connection, once there is one."""
+        now_s = self._clock.now_s()
+        if self._attempt is None and now_s - self._began_s >= CALL_AGAIN_S:
+            self._attempt, self._began_s = socket.socket(socket.AF_INET, socket.SOCK_STREAM), now_s
+            self._attempt.setblocking(False)
+        if self._attempt is None:
+            return None
+        result = self._attempt.connect_ex(self._address)
+        if result in (0, errno.EISCONN) and not _is_own_echo(self._attempt):
+            made, self._attempt = self._attempt, None
+            return made
+        if result not in UNDER_WAY or now_s - self._began_s > CONNECT_TIMEOUT_S:
+            self.close()
+        return None
+
+    def close(self) -> None:
+        """Give the attempt up."""
+        if self._attempt is not None:
+            self._attempt.close()
+            self._attempt = None
+
+
+def _is_own_echo(connected: socket.socket) -> bool:
+    """Loopback joins a caller to itself when its own port happens to be the one it calls."""
+    try:
+        return bool(connected.getsockname() == connected.getpeername())
+    except OSError:  # gone already
+        return True
 
 
 class _Stream:

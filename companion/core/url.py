@@ -61,10 +61,10 @@ def open_url(url: Url | str, clock: Clock | None = None) -> Transport:
     if url.scheme == "tcpin":
         return tcp_in(url.host, url.port)
     if url.scheme == "tcpout":
-        return tcp_out(url.host, url.port)
+        return tcp_out(url.host, url.port, clock)
     from companion.core.serial_port import SerialPort  # here: termios is not on every system
 
-    return SerialPort(url.host, url.port)
+    return SerialPort(url.host, url.port, clock)
 
 
 def _serial(text: str, rest: str) -> Url:
