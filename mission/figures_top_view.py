@@ -115,12 +115,13 @@ def _figures_of(result: Result) -> list[tuple[str, str]]:
 
 
 def _legend(nav: NavigatorLog) -> list[Line2D]:
-    shown = [mode for mode in MODE_COLOURS if mode in nav.mode]
+    lines = [Line2D([], [], color=MODE_COLOURS[m], lw=2.6, label=MODE_LABELS[m]) for m in MODE_COLOURS if m in nav.mode]
+    if nav.decisions:
+        lines.append(Line2D([], [], color=PROPOSAL_COLOUR, lw=1.0, label="proposals"))
+        lines.append(Line2D([], [], color=PROPOSAL_COLOUR, lw=1.0, ls=":", label="accepted by the checker"))
     ring = MODE_COLOURS["standby"]
     return [
-        *(Line2D([], [], color=MODE_COLOURS[mode], lw=2.6, label=MODE_LABELS[mode]) for mode in shown),
-        Line2D([], [], color=PROPOSAL_COLOUR, lw=1.0, label="proposals"),
-        Line2D([], [], color=PROPOSAL_COLOUR, lw=1.0, ls=":", label="accepted by the checker"),
+        *lines,
         Line2D([], [], color=INK, ls="", marker=".", ms=3, label="setpoints"),
         Line2D([], [], color=START_COLOUR, ls="", marker="o", ms=7, mec="white", label="start of the world"),
         Line2D([], [], color="white", ls="", marker="o", ms=5, mec=ring, mew=1.4, label="take-off of this seed"),
