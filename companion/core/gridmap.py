@@ -204,7 +204,7 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     paint = inside & (possible | ~open_arc[sector])
     cells = flat[paint]
     hit_t.ravel()[cells] = scan.t_s
-    hit_ne_m.reshape(-1, 2)[cells] = points[paint]
+    _place(hit_ne_m, cells, points[paint])
     whole = ~open_arc[sector]
     if not whole.any():
         return np.empty((0, 2))
@@ -212,6 +212,16 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     moved = np.flatnonzero(count)
     middle = [np.bincount(sector, whole * points[:, axis])[moved] / count[moved] for axis in (0, 1)]
     return np.stack(middle, axis=1)
+
+
+def _place(hit_ne_m: F32, cells: I32, points_ne_m: F64) -> None:
+    """Write the hits of one scan; of several in one cell the middle of first and last, so that left equals right."""
+    stored = hit_ne_m.reshape(-1).view(np.complex64)  # north and east as one number: a third of the time
+    points = points_ne_m.astype(np.float32).reshape(-1).view(np.complex64)
+    stored[cells[::-1]] = points[::-1]
+    first = stored[cells]
+    stored[cells] = points
+    stored[cells] = (first + stored[cells]) * np.float32(0.5)
 
 
 def _window(n: int, i: int, j: int, radius: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
