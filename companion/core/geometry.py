@@ -4,7 +4,10 @@ Plane geometry in (north, east) metres, pure. Polylines are (k, 2) arrays, k >= 
 vertices are walked in plain floats (a tick has no time for many tiny arrays); many points are handled as arrays.
 """
 
+import itertools
 import math
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -33,26 +36,18 @@ class Segment(NamedTuple):
     s_m: float
 
 
-def segments(path_ned_m: F64) -> list[Segment]:
-    """The pieces of positive length, in order; empty for a polyline that is a single place."""
-    pieces: list[Segment] = []
-    s = 0.0
-    vertices: list[list[float]] = path_ned_m.tolist()
-    north, east = vertices[0]
-    for next_north, next_east in vertices[1:]:
-        dn, de = next_north - north, next_east - east
-        length = math.hypot(dn, de)
-        if length > 0.0:
-            pieces.append(Segment(north, east, dn / length, de / length, length, s))
-            s += length
-            north, east = next_north, next_east
-    return pieces
+def segments(path_ned_m: F64) -> tuple[Segment, ...]:
+    """The pieces of positive length, in order; empty for a polyline that is a single place.
+
+    A tick asks much about few polylines: the pieces of those asked about last are kept.
+    """
+    return _cut(path_ned_m).pieces
 
 
 def arc_lengths(path_ned_m: F64) -> F64:
     """Arc length (k,) of each vertex."""
-    steps = np.hypot(np.diff(path_ned_m[:, 0]), np.diff(path_ned_m[:, 1]))
-    return np.concatenate(([0.0], np.cumsum(steps)))
+    steps = [math.dist(here, there) for here, there in itertools.pairwise(path_ned_m.tolist())]
+    return np.array([0.0, *itertools.accumulate(steps)])
 
 
 def length(path_ned_m: F64) -> float:
@@ -85,11 +80,8 @@ def project(path_ned_m: F64, pos_ned_m: F64, s_min_m: float = 0.0, s_max_m: floa
 
 def point_at(path_ned_m: F64, s_m: float) -> F64:
     """The place (2,) at arc length s_m; the ends beyond the ends."""
-    piece = segment_at(segments(path_ned_m), s_m)
-    if piece is None:
-        return np.array(path_ned_m[0], dtype=np.float64)
-    along = min(max(s_m - piece.s_m, 0.0), piece.length_m)
-    return np.array([piece.north_m + along * piece.dir_north, piece.east_m + along * piece.dir_east])
+    pieces = segments(path_ned_m)
+    return np.array(place_at(pieces, s_m) if pieces else path_ned_m[0], dtype=np.float64)
 
 
 def tangent_at(path_ned_m: F64, s_m: float) -> F64:
@@ -98,7 +90,7 @@ def tangent_at(path_ned_m: F64, s_m: float) -> F64:
     return np.zeros(2) if piece is None else np.array([piece.dir_north, piece.dir_east])
 
 
-def segment_at(pieces: list[Segment], s_m: float) -> Segment | None:
+def segment_at(pieces: Sequence[Segment], s_m: float) -> Segment | None:
     """The piece that holds arc length s_m, the first or last one beyond the ends; None if there is none."""
     found: Segment | None = None
     for piece in pieces:
@@ -108,43 +100,60 @@ def segment_at(pieces: list[Segment], s_m: float) -> Segment | None:
     return found
 
 
+def place_at(pieces: Sequence[Segment], s_m: float) -> tuple[float, float]:
+    """North and east at arc length s_m; the ends beyond the ends. There must be a piece."""
+    piece = segment_at(pieces, s_m) or pieces[0]
+    along = min(max(s_m - piece.s_m, 0.0), piece.length_m)
+    return piece.north_m + along * piece.dir_north, piece.east_m + along * piece.dir_east
+
+
 def part(path_ned_m: F64, s_from_m: float, s_to_m: float = math.inf) -> F64:
     """The polyline between two arc lengths, both clamped to its ends; at least one vertex."""
-    s = arc_lengths(path_ned_m)
-    low = min(max(s_from_m, 0.0), float(s[-1]))
-    high = min(max(s_to_m, low), float(s[-1]))
-    inside = path_ned_m[(s > low) & (s < high)]
-    ends = [point_at(path_ned_m, low), point_at(path_ned_m, high)]
-    return np.concatenate((ends[:1], inside, ends[1:])) if high > low else np.array(ends[:1])
+    pieces = segments(path_ned_m)
+    if not pieces:
+        return np.array(path_ned_m[:1], dtype=np.float64)
+    end_s = pieces[-1].s_m + pieces[-1].length_m
+    low = min(max(s_from_m, 0.0), end_s)
+    high = min(max(s_to_m, low), end_s)
+    vertices = [place_at(pieces, low)]
+    if high > low:
+        vertices += [(piece.north_m, piece.east_m) for piece in pieces if low < piece.s_m < high]
+        vertices.append(place_at(pieces, high))
+    return np.array(vertices)
 
 
 def resample(path_ned_m: F64, spacing_m: float) -> F64:
     """Vertices at equal arc length, not farther apart than spacing_m; first and last vertex kept."""
     s = arc_lengths(path_ned_m)
-    count = max(1, math.ceil(float(s[-1]) / spacing_m - 1e-9))
-    at = np.linspace(0.0, float(s[-1]), count + 1)
-    return np.stack((np.interp(at, s, path_ned_m[:, 0]), np.interp(at, s, path_ned_m[:, 1])), axis=1)
+    whole = float(s[-1])
+    count = max(1, math.ceil(whole / spacing_m - 1e-9))
+    at = np.arange(count + 1) * (whole / count)
+    at[-1] = whole
+    places = np.empty((count + 1, 2))
+    places[:, 0] = np.interp(at, s, path_ned_m[:, 0])
+    places[:, 1] = np.interp(at, s, path_ned_m[:, 1])
+    return places
 
 
 def points_near(path_ned_m: F64, points_ned_m: F64, reach_m: float) -> F64:
     """The points inside the bounding box of the polyline grown by reach_m: every point within reach_m is among them."""
     if len(points_ned_m) == 0:
         return points_ned_m
-    low, high = path_ned_m.min(axis=0).tolist(), path_ned_m.max(axis=0).tolist()
+    norths, easts = path_ned_m.T.tolist()
     north, east = points_ned_m[:, 0], points_ned_m[:, 1]
-    inside = (north >= low[0] - reach_m) & (north <= high[0] + reach_m)
-    inside &= (east >= low[1] - reach_m) & (east <= high[1] + reach_m)
+    inside = (north >= min(norths) - reach_m) & (north <= max(norths) + reach_m)
+    inside &= (east >= min(easts) - reach_m) & (east <= max(easts) + reach_m)
     near: F64 = points_ned_m[inside]
     return near
 
 
 def points_to_polyline_distance(path_ned_m: F64, points_ned_m: F64) -> F64:
     """Distance (n,) of each point to the polyline."""
-    pieces = segments(path_ned_m)
-    if not pieces:
+    cut = _cut(path_ned_m)
+    if not cut.pieces:
         alone: F64 = np.hypot(points_ned_m[:, 0] - path_ned_m[0, 0], points_ned_m[:, 1] - path_ned_m[0, 1])
         return alone
-    along, lateral, lengths = _in_segments(pieces, points_ned_m)
+    along, lateral, lengths = _in_segments(cut.table, points_ned_m)
     beyond = along - np.minimum(np.maximum(along, 0.0), lengths)
     distance: F64 = np.sqrt((beyond * beyond + lateral * lateral).min(axis=0))
     return distance
@@ -180,33 +189,57 @@ def swept_free_length(
     ``required_distance`` for points that are inside the radius at s_m already.
     """
     ahead = part(path_ned_m, s_m, s_m + horizon_m) if s_m > 0.0 or horizon_m < math.inf else path_ned_m
-    pieces = segments(ahead)
-    if not pieces:
+    cut = _cut(ahead)
+    if not cut.pieces:
         return 0.0
-    whole = pieces[-1].s_m + pieces[-1].length_m
+    whole = cut.pieces[-1].s_m + cut.pieces[-1].length_m
     near = points_near(ahead, points_ned_m, radius_m)
     if len(near) == 0:
         return whole
-    return min(whole, _first_contact(pieces, near, required_distance(ahead[0], near, radius_m)))
+    return min(whole, _first_contact(cut.table, near, required_distance(ahead[0], near, radius_m)))
 
 
-def _first_contact(pieces: list[Segment], points_ned_m: F64, required_m: F64) -> float:
+def _first_contact(table: F64, points_ned_m: F64, required_m: F64) -> float:
     """Smallest arc length at which a point is nearer than required; inf if none ever is."""
-    along, lateral, lengths = _in_segments(pieces, points_ned_m)
+    along, lateral, lengths = _in_segments(table, points_ned_m)
     chord = required_m * required_m - lateral * lateral
     half = np.sqrt(np.maximum(chord, 0.0))
     touched = (chord > 0.0) & (along + half > 0.0) & (along - half < lengths)
     if not touched.any():
         return math.inf
-    start_s = np.array([piece.s_m for piece in pieces])[:, None]
-    entry: F64 = start_s + np.maximum(along - half, 0.0)
+    entry: F64 = table[:, 5:6] + np.maximum(along - half, 0.0)
     return float(entry[touched].min())
 
 
-def _in_segments(pieces: list[Segment], points_ned_m: F64) -> tuple[F64, F64, F64]:
+def _in_segments(table: F64, points_ned_m: F64) -> tuple[F64, F64, F64]:
     """Coordinates (m, n) of every point along and right of every piece, and the lengths (m, 1)."""
-    table = np.array(pieces)
     dn = points_ned_m[:, 0] - table[:, 0:1]
     de = points_ned_m[:, 1] - table[:, 1:2]
     tn, te = table[:, 2:3], table[:, 3:4]
     return dn * tn + de * te, tn * de - te * dn, table[:, 4:5]
+
+
+class _Cut(NamedTuple):
+    """A polyline in pieces, and the same as an array (m, 6)."""
+
+    pieces: tuple[Segment, ...]
+    table: F64
+
+
+def _cut(path_ned_m: F64) -> _Cut:
+    return _cut_of(np.asarray(path_ned_m, np.float64).tobytes())
+
+
+@lru_cache(maxsize=64)
+def _cut_of(vertices: bytes) -> _Cut:
+    pieces: list[Segment] = []
+    s = 0.0
+    (north, east), *others = np.frombuffer(vertices).reshape(-1, 2).tolist()
+    for next_north, next_east in others:
+        dn, de = next_north - north, next_east - east
+        length = math.hypot(dn, de)
+        if length > 0.0:
+            pieces.append(Segment(north, east, dn / length, de / length, length, s))
+            s += length
+            north, east = next_north, next_east
+    return _Cut(tuple(pieces), np.array(pieces))

@@ -88,7 +88,7 @@ def follow(path_ned_m: F64, state: VehicleState, s_min_m: float, target: Target,
 
 
 def _velocity(
-    pieces: list[geometry.Segment], s_m: float, speed_m_s: float, params: FollowerParams
+    pieces: tuple[geometry.Segment, ...], s_m: float, speed_m_s: float, params: FollowerParams
 ) -> tuple[float, float]:
     """Velocity along the chord of the path around s_m; the direction of the path where that chord vanishes."""
     here = geometry.segment_at(pieces, s_m)
@@ -96,22 +96,16 @@ def _velocity(
         return 0.0, 0.0
     end_s = pieces[-1].s_m + pieces[-1].length_m
     middle = min(max(s_m, params.blend_m), max(end_s - params.blend_m, 0.0))
-    back_n, back_e = _at(pieces, middle - params.blend_m)
-    on_n, on_e = _at(pieces, middle + params.blend_m)
+    back_n, back_e = geometry.place_at(pieces, middle - params.blend_m)
+    on_n, on_e = geometry.place_at(pieces, middle + params.blend_m)
     chord = math.hypot(on_n - back_n, on_e - back_e)
     if chord < 0.5 * params.blend_m:
         return speed_m_s * here.dir_north, speed_m_s * here.dir_east
     return speed_m_s * (on_n - back_n) / chord, speed_m_s * (on_e - back_e) / chord
 
 
-def _place(pieces: list[geometry.Segment], s_m: float, path_ned_m: F64) -> tuple[float, float]:
-    return _at(pieces, s_m) if pieces else (float(path_ned_m[0, 0]), float(path_ned_m[0, 1]))
-
-
-def _at(pieces: list[geometry.Segment], s_m: float) -> tuple[float, float]:
-    piece = geometry.segment_at(pieces, s_m) or pieces[0]
-    along = min(max(s_m - piece.s_m, 0.0), piece.length_m)
-    return piece.north_m + along * piece.dir_north, piece.east_m + along * piece.dir_east
+def _place(pieces: tuple[geometry.Segment, ...], s_m: float, path_ned_m: F64) -> tuple[float, float]:
+    return geometry.place_at(pieces, s_m) if pieces else (float(path_ned_m[0, 0]), float(path_ned_m[0, 1]))
 
 
 def _limited(north: float, east: float, most: float) -> tuple[float, float]:
