@@ -73,6 +73,7 @@ class Companion:
         self._pending: tuple[Inputs, float] | None = None  # the newest scan, and when it arrived
         self._held_t_s = 0.0  # vehicle time of the last hold setpoint
         self._first_state_s: float | None = None
+        self._reboots = 0  # of the vehicle, that we know of
         self._hinted = False
 
     @property
@@ -101,6 +102,8 @@ class Companion:
 
     def _handle(self, message: Message, arrived_s: float) -> None:
         inputs = self._assembler.feed(message)
+        if self._assembler.reboots != self._reboots:
+            self._vehicle_booted()
         system = self._assembler.vehicle_system
         if message.get_srcSystem() == system and message.get_srcComponent() == codec.VEHICLE_COMPONENT:
             self._heard(arrived_s)
@@ -119,7 +122,19 @@ class Companion:
                 link.speak_as(system, codec.COMPANION_COMPONENT)
             self._heartbeat_s = now_s - HEARTBEAT_S  # introduce ourselves at once
             self._tell(f"vehicle {system} heard on {self._vehicle.transport.name}")
+        elif self._watch.waiting:
+            self._watch.waiting = False
+            self._tell("vehicle is back")
         self._watch.heard_s = now_s
+
+    def _vehicle_booted(self) -> None:
+        """Its clock and origin are new: nothing that was judged by the old ones counts any more."""
+        self._reboots = self._assembler.reboots
+        self._pending = self._first_state_s = None
+        self._held_t_s = 0.0
+        if self._session.hold_reason is HoldReason.SCAN_LOST:
+            self._session.release()
+        self._tell("vehicle has booted: starting afresh, with the goal counted from where it is now")
 
     def _take_pending(self) -> None:
         """Only the newest scan of a batch is answered: one who falls behind must not fly on old news."""
@@ -215,14 +230,24 @@ class Companion:
         if self._watch.never_heard(now_s):
             patience = f"{config.connect_timeout_s:g} s"
             self._finish(ExitCode.NO_VEHICLE, f"no vehicle answered on {config.vehicle_url} within {patience}")
-        elif self._watch.lost(now_s):
+        elif self._watch.lost(now_s) and is_flying(status):
             self._finish(ExitCode.VEHICLE_LOST, f"vehicle lost: nothing heard for {config.lost_timeout_s:g} s")
+        elif self._watch.lost(now_s):
+            self._wait_for_vehicle(now_s)
         elif hold_reason is HoldReason.TICK_FAILED and not is_flying(status):
             self._finish(ExitCode.TICK_FAILED, "navigator failed in flight; somebody else has the vehicle now")
         elif hold_reason is HoldReason.SCAN_LOST and status is not None and not status.armed:
             self._finish(ExitCode.LANDED, "disarmed while the scan was lost")
         elif config.engage is Engage.AUTO and self._may_engage():
             self._ask_mode(self._engage_request, codec.PX4_OFFBOARD, now_s)
+
+    def _wait_for_vehicle(self, now_s: float) -> None:
+        """Silent while we did not steer: it boots, or somebody sees to the cable."""
+        if not self._watch.waiting:
+            self._watch.waiting = True
+            self._tell(f"vehicle silent for {self._config.lost_timeout_s:g} s: waiting for it")
+        if self._watch.given_up(now_s):
+            self._finish(ExitCode.NO_VEHICLE, f"vehicle did not come back within {self._config.connect_timeout_s:g} s")
 
     def _may_engage(self) -> bool:
         """Setpoints are streaming, and nobody would be surprised."""

@@ -57,11 +57,18 @@ class Session:
         self._navigator = navigator
         self._memory: Any = navigator.start(params)
         self._stop: limits.HoldMemory | None = None
+        self._last_scan_s = -math.inf
         self.hold_reason: HoldReason | None = None
         self.engaged = False  # the autopilot was armed and in OFFBOARD at some tick
 
     def tick(self, inputs: Inputs) -> Answer:
-        """Let the navigator answer a scan. Raises what it trips over, ValueError for a setpoint that is no number."""
+        """Let the navigator answer a scan. Raises what it trips over, ValueError for a setpoint that is no number.
+
+        A scan older than the last one means that the vehicle has booted: all that was remembered is of another origin.
+        """
+        if inputs.scan.t_s < self._last_scan_s:
+            self._memory, self.engaged = self._navigator.start(self._params), False
+        self._last_scan_s = inputs.scan.t_s
         self.engaged = self.engaged or is_flying(inputs.status)
         self._memory, setpoint, record = self._navigator.tick(self._memory, inputs, self._task, self._params)
         if not _is_finite(setpoint):

@@ -20,6 +20,7 @@ class VehicleWatch:
     connect_timeout_s: float
     lost_timeout_s: float
     heard_s: float | None = None  # last message of the autopilot
+    waiting: bool = False  # it was there, and may come back
 
     def never_heard(self, now_s: float) -> bool:
         """Nobody has answered in time."""
@@ -28,6 +29,11 @@ class VehicleWatch:
     def lost(self, now_s: float) -> bool:
         """It was there and has fallen silent."""
         return self.heard_s is not None and now_s - self.heard_s > self.lost_timeout_s
+
+    def given_up(self, now_s: float) -> bool:
+        """It has been silent for longer than a first word was waited for."""
+        patience_s = self.lost_timeout_s + self.connect_timeout_s
+        return self.heard_s is not None and now_s - self.heard_s > patience_s
 
 
 def scan_lost(flying: bool, vehicle_time_s: float, last_scan_s: float, patience_s: float) -> bool:

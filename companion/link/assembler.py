@@ -21,6 +21,7 @@ from companion.link.samples import REBOOT_S, Samples, state_at
 Message = Any  # a MAVLink_*_message object
 
 AUTOPILOT_COMPONENT = codec.VEHICLE_COMPONENT
+REBOOT_SAMPLES = 5  # so many old samples in a row are a clock that started again; fewer are packets that came late
 
 
 class Assembler:
@@ -33,6 +34,7 @@ class Assembler:
         self._heartbeat: Message | None = None
         self._extended: Message | None = None
         self._last_scan_s = -math.inf
+        self._old_samples = 0  # in a row
         self.status: AutopilotStatus | None = None  # what the autopilot last said of itself
         self.vehicle_system: int | None = None  # system id of the autopilot, once heard
         self.reboots = 0  # times that vehicle time started again
@@ -105,12 +107,23 @@ class Assembler:
         if not all(map(math.isfinite, (*value, *rate))):
             return  # an estimate that is not there yet: as if nothing was heard
         t_s = codec.from_ms(time_boot_ms)
-        if t_s < samples.newest_s - REBOOT_S:
-            self.reboots += 1
-            self._position.clear()
-            self._attitude.clear()
-            self._last_scan_s = -math.inf
+        if t_s >= samples.newest_s - REBOOT_S:
+            self._old_samples = 0
+        else:
+            self._old_samples += 1
+            if self._old_samples < REBOOT_SAMPLES:
+                return
+            self._forget()
         samples.put(t_s, np.array(value), np.array(rate))
+
+    def _forget(self) -> None:
+        """The vehicle has booted: its clock and its origin are new, and what it said of itself is over."""
+        self.reboots += 1
+        self._old_samples = 0
+        self._position.clear()
+        self._attitude.clear()
+        self._last_scan_s = -math.inf
+        self._heartbeat = self._extended = self.status = None
 
     def _take_scan(self, message: Message) -> Inputs | None:
         if self._params.lidar_component not in (0, message.get_srcComponent()):

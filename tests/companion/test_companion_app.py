@@ -172,6 +172,59 @@ def test_a_vehicle_that_falls_silent_in_flight_ends_the_run(tmp_path: Path) -> N
     assert bench.said[-1] == "vehicle lost: nothing heard for 3 s"
 
 
+def test_a_vehicle_that_falls_silent_while_nobody_steers_is_waited_for(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    bench.run(1.0)
+    bench.vehicle.sends_anything = False
+    bench.run(7.0)
+    assert bench.said[-1] == "vehicle silent for 3 s: waiting for it"
+    bench.vehicle.sends_anything = True
+    bench.run(1.0)
+    assert "vehicle is back" in bench.said
+    assert bench.vehicle.setpoints[-1].t_s == bench.vehicle.t_s
+    bench.vehicle.sends_anything = False
+    bench.run(8.5)
+    assert (bench.companion.exit_code, bench.said[-1]) == (3, "vehicle did not come back within 5 s")
+
+
+@pytest.mark.parametrize("silent_s", [0.5, 5.0])
+def test_a_vehicle_that_boots_is_flown_to_the_goal_counted_from_where_it_booted(
+    tmp_path: Path, silent_s: float
+) -> None:
+    bench = Bench(tmp_path, brain=navigator)
+    vehicle = bench.vehicle
+    bench.run(10.0)
+    vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(1.5)
+    vehicle.custom_mode = codec.PX4_HOLD  # the pilot lands it, and pulls the battery
+    bench.run(0.5)
+    vehicle.sends_anything = False
+    bench.run(silent_s)
+    assert np.linalg.norm(vehicle.pos_ned_m[:2]) > 1.0
+    vehicle.k, vehicle.pos_ned_m, vehicle.sends_anything = 0, np.array([0.0, 0.0, -3.0]), True
+    bench.run(2.0)
+    assert "vehicle has booted: starting afresh, with the goal counted from where it is now" in bench.said
+    assert vehicle.mode_requests == []
+    vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(60.0)
+    assert (bench.companion.exit_code, bench.companion.reason) == (0, "landed and disarmed")
+    assert np.linalg.norm(vehicle.pos_ned_m[:2] - TASK.goal_ned_m) < 0.5
+    bench.logs.close()
+    session = Session(TASK, navigator.Params(), navigator)
+    again = b"".join(record_line(session.tick(i).row) for i in replay(tmp_path / "log" / PACKETS))
+    assert again == (tmp_path / "log" / RECORDS).read_bytes()
+
+
+def test_a_vehicle_that_boots_in_flight_is_not_taken_for_one_that_has_landed(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, brain=navigator)
+    bench.run(10.0)
+    bench.vehicle.custom_mode = codec.PX4_OFFBOARD
+    bench.run(1.0)
+    bench.vehicle.k, bench.vehicle.armed, bench.vehicle.custom_mode = 0, False, codec.PX4_HOLD
+    bench.run(3.0)
+    assert bench.companion.exit_code is None
+
+
 def test_a_vehicle_clock_that_stands_still_while_it_speaks_is_not_lost(tmp_path: Path) -> None:
     bench = Bench(tmp_path)
     bench.run(1.0)

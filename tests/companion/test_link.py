@@ -192,9 +192,24 @@ def test_a_heartbeat_without_an_autopilot_is_no_vehicle() -> None:
 def test_a_vehicle_that_reboots_is_followed_into_its_new_time() -> None:
     assembler = greeted()
     feed(assembler, *state_messages(500.0), codec.encode_scan(scan(500.0)))
-    (inputs,) = feed(assembler, *state_messages(1.0), codec.encode_scan(scan(1.0)))
-    assert_same_state(inputs.state, codec.quantise_state(state(1.0)))
+    for k in range(1, 6):
+        feed(assembler, *state_messages(k / 50))
     assert assembler.reboots == 1
+    assert assembler.status is None  # who was armed and in OFFBOARD is not any more
+    heartbeat = codec.encode_vehicle_heartbeat(29, codec.PX4_HOLD, 3)
+    (inputs,) = feed(assembler, heartbeat, *state_messages(1.0), codec.encode_scan(scan(1.0)))
+    assert_same_state(inputs.state, codec.quantise_state(state(1.0)))
+    assert not inputs.status.armed
+
+
+def test_a_few_packets_that_come_seconds_late_are_no_reboot() -> None:
+    assembler = greeted()
+    feed(assembler, *state_messages(500.0))
+    for k in range(1, 20):
+        late = state_messages(490.0 + k / 50)
+        assert feed(assembler, *late, *late, *state_messages(500.0 + k / 50)) == []
+    assert assembler.reboots == 0
+    assert assembler.vehicle_time_s == 500.38
 
 
 @pytest.mark.parametrize("broken", ["position", "attitude"])
