@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from companion.arbiter import arbiter
 from companion.core import gridmap
 from companion.core.gridmap import GridMap
-from companion.core.types import F64
+from companion.core.types import F64, VehicleState
 from companion.guidance.landing import LandingState
 from companion.guidance.limits import HoldMemory
 from companion.guidance.line import GuidanceLine
@@ -50,9 +50,10 @@ class Memory:
     yaw_sp_rad: float
     policy: F64 | None  # whatever the policy wants to see again
     decisions: int
+    state: VehicleState | None  # the last one that could be believed
     engaged: Engagement | None
 
 
 def start(params: Params) -> Memory:
     """Nothing seen, nobody flies."""
-    return Memory(gridmap.empty(params.map), (), 0, 0.0, 0.0, None, 0, None)
+    return Memory(gridmap.empty(params.map), (), 0, 0.0, 0.0, None, 0, None, None)

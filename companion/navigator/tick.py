@@ -15,6 +15,7 @@ from companion.core.inputs import Inputs
 from companion.core.task import Task
 from companion.core.types import NavMode, Setpoint, VehicleState
 from companion.guidance import landing, limits, line
+from companion.navigator.believe import believable, stand_in
 from companion.navigator.decide import Decision, decide, due
 from companion.navigator.memory import Engagement, Memory
 from companion.navigator.params import Params
@@ -62,6 +63,9 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
     Returns:
         The next memory, the setpoint that answers the scan, and the record of the tick.
     """
+    known = believable(inputs)
+    if not known:
+        inputs = stand_in(inputs, memory.state, memory.t_s)
     state = inputs.state
     percept = perceive(
         Remembered(memory.t_s, memory.grid, memory.tracks),
@@ -74,8 +78,10 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
     )
     dt_s = state.t_s - memory.t_s
     memory = replace(memory, grid=percept.grid, tracks=percept.tracks, ticks=memory.ticks + 1, t_s=state.t_s)
+    if known:
+        memory = replace(memory, state=state)
     goal_m = _goal_distance(state, task)
-    if not (inputs.status.offboard and inputs.status.armed):
+    if not (inputs.status.offboard and inputs.status.armed) or memory.state is None:
         memory, setpoint = _standby(memory, state)
         return memory, setpoint, Record(inputs, percept, memory, setpoint, goal_m)
     engaged = memory.engaged or _engage(state, task)
@@ -104,6 +110,8 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
 
 def _standby(memory: Memory, state: VehicleState) -> tuple[Memory, Setpoint]:
     """Not ours to fly: answer with where the vehicle is, so that OFFBOARD can be given at any moment."""
+    if memory.state is None:
+        return memory, Setpoint(state.t_s, None, np.zeros(3), None, None)  # wherever it is: stay
     yaw = yaw_rad(state.q_ned_frd)
     memory = replace(memory, engaged=None, policy=None, yaw_sp_rad=yaw)
     return memory, Setpoint(state.t_s, state.pos_ned_m.copy(), None, None, yaw)
