@@ -5,6 +5,7 @@ from pathlib import Path
 import jsbsim
 
 FT_M = 0.3048
+IN_M = 0.0254
 LB_N = 4.4482216152605
 
 MASS_KG = 0.907  # mavic2pro.xml
@@ -16,6 +17,7 @@ MODELS = Path(__file__).resolve().parent.parent / "models" / "aircraft"  # besid
 NAME = "mavic2pro"
 
 AXES = "ned"
+ROTORS = ("fr", "rl", "fl", "rr")  # front right, rear left, front left, rear right: PX4's quad x
 # Properties that ``vehicle`` reads for its truth, in that order, and those that it writes.
 TURBULENCE = "atmosphere/turbulence/milspec"
 READ = (
@@ -48,6 +50,8 @@ WRITTEN = (
     "sp/yaw-rate-rad_s",
     "use/yaw",
     "sp/thrust",
+    *(f"sp/motor-{rotor}" for rotor in ROTORS),
+    *(f"external_reactions/rotor_{rotor}/location-{axis}-in" for rotor in ROTORS for axis in "xy"),
     *(f"atmosphere/wind-{axis}-fps" for axis in ("north", "east", "down")),
     "atmosphere/turb-type",
     f"{TURBULENCE}/windspeed_at_20ft_AGL-fps",

@@ -17,7 +17,7 @@ import numpy as np
 from companion.core.codec import from_ms, quantise_scan, quantise_state, to_ms
 from companion.core.types import F64, AutopilotStatus, Scan, Setpoint, VehicleState
 from sitl.autopilot import Autopilot
-from sitl.collision import CollisionChecker
+from sitl.contact import ContactWatch
 from sitl.demand import Demand, Loop, TrajectorySetpoint
 from sitl.lidar import Lidar, LidarParams
 from sitl.modes import FlightMode
@@ -29,7 +29,6 @@ from sitl.world import World
 
 STEP_MS: Final = 4  # 250 Hz physics
 CONTROL_STEPS: Final = 10  # autopilot at 25 Hz
-SPEED_SLACK_M_S: Final = 2.0  # assumed: more than the vehicle gains within one scan
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +61,9 @@ class Simulation:
         self.config = config or SimConfig()
         self.world = world
         self.rows: list[TruthRow] = []  # one a scan, until the vehicle has disarmed after its flight
-        self.contact = False  # ever
         spawn = world.start_ned_m if self.config.spawn_ned_m is None else self.config.spawn_ned_m
         self.spawn_ned_m: F64 = np.array([spawn[0], spawn[1], 0.0])
-        self.scan_steps = _scan_steps(self.config.lidar)
+        self.scan_steps = scan_steps(self.config.lidar)
         self.state: VehicleState  # the estimate at the last control tick, quantised
         self.truth: Truth
         self.scan: Scan | None = None
@@ -80,13 +78,15 @@ class Simulation:
         self._applied: Demand | None = None
         self._armed = False
         self._lidar = Lidar(world, self.config.lidar, self.config.seed)
-        self._collision = CollisionChecker(world, self.config.radius_m)
-        self._mover_m_s = max((m.speed_m_s for m in world.movers), default=0.0)
-        self._check_step = 0  # when contact has to be looked at again
-        self._clearance_m = math.inf  # smallest since the last row
+        self._contact = ContactWatch(world, self.config.radius_m, self.spawn_ned_m, STEP_MS / 1e3, self.scan_steps)
         self._closed = False  # no more rows
         self._sense()
-        self._check_contact()
+        self._look()
+
+    @property
+    def contact(self) -> bool:
+        """Was anything ever touched?"""
+        return self._contact.contact
 
     @property
     def t_s(self) -> float:
@@ -157,7 +157,7 @@ class Simulation:
         event = self._step + CONTROL_STEPS - self._step % CONTROL_STEPS
         if self._queue:
             event = min(event, max(self._queue[0][0], self._step))
-        return min(event, max(self._check_step, self._step + 1))
+        return min(event, max(self._contact.due_step, self._step + 1))
 
     def _advance_to(self, step: int) -> None:
         if step > self._step:
@@ -167,13 +167,13 @@ class Simulation:
         while self._queue and self._queue[0][0] <= self._step:
             self.autopilot.use_setpoint(self._queue.popleft()[1])
         control = self._step % CONTROL_STEPS == 0
-        checked = self._step >= self._check_step
+        checked = self._step >= self._contact.due_step
         if control or checked:
             self._sense()
         if control:
             self.autopilot.update(self.state, self.truth.on_ground)
         if checked:
-            self._check_contact()
+            self._look()
 
     def _sense(self) -> None:
         truth = self.truth = self._vehicle.truth()
@@ -181,20 +181,8 @@ class Simulation:
             VehicleState(self.t_s, truth.pos_ned_m, truth.vel_ned_m_s, truth.q_ned_frd, truth.rates_frd_rad_s)
         )
 
-    def _check_contact(self) -> None:
-        """Look, and work out until when nothing can be touched: clearance over the highest closing speed."""
-        pos = self.truth.pos_ned_m + self.spawn_ned_m
-        clearance_m = self._collision.clearance(self.t_s, pos)
-        self._clearance_m = min(self._clearance_m, clearance_m)
-        self.contact = self.contact or not clearance_m > 0.0
-        north_m_s, east_m_s, down_m_s = self.truth.vel_ned_m_s.tolist()
-        speed_m_s = math.hypot(north_m_s, east_m_s, down_m_s) + SPEED_SLACK_M_S + self._mover_m_s
-        free_steps = clearance_m / speed_m_s * 1e3 / STEP_MS
-        to_scan = self.scan_steps - self._step % self.scan_steps
-        if free_steps >= to_scan:
-            self._check_step = self._step + to_scan
-        else:
-            self._check_step = self._step + (int(free_steps) if free_steps > 1.0 else 1)
+    def _look(self) -> None:
+        self._contact.look(self._step, self.t_s, self.truth)
 
     def _observe(self) -> Observation:
         ap = self.autopilot
@@ -202,10 +190,10 @@ class Simulation:
         self._check_scan_instant()
         scan = self._lidar.scan(self.t_s, self.truth.pos_ned_m + self.spawn_ned_m, self.truth.q_ned_frd)
         self.scan = quantise_scan(scan)
+        clearance_m = self._contact.take_smallest_m()
         if not self._closed:
             self._closed = self.finished  # the last row shows the vehicle disarmed
-            self.rows.append(TruthRow(self.t_ms, self.truth, self._clearance_m, self.contact, mode, ap.armed, landed))
-        self._clearance_m = math.inf
+            self.rows.append(TruthRow(self.t_ms, self.truth, clearance_m, self.contact, mode, ap.armed, landed))
         status = AutopilotStatus(ap.armed, mode is FlightMode.OFFBOARD, landed)
         return Observation(self.state, status, self.scan)
 
@@ -213,8 +201,8 @@ class Simulation:
         """A scan instant off the control grid has neither state nor clearance yet."""
         if self._step % CONTROL_STEPS:
             self._sense()
-        if self._check_step <= self._step:
-            self._check_contact()
+        if self._contact.due_step <= self._step:
+            self._look()
 
     # --- to the vehicle ---------------------------------------------------------------------------------------
 
@@ -239,7 +227,7 @@ class Simulation:
         )
 
 
-def _scan_steps(params: LidarParams) -> int:
+def scan_steps(params: LidarParams) -> int:
     """Physics steps from scan to scan. Raises ValueError when the rate does not fit the physics."""
     steps = round(1e3 / STEP_MS / params.rate_hz)
     if steps < 1 or not math.isclose(steps * STEP_MS / 1e3 * params.rate_hz, 1.0, rel_tol=1e-6):

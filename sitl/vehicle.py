@@ -20,10 +20,12 @@ from sitl.aircraft import (
     CONTACTS,
     FT_M,
     FULL_THRUST_N,
+    IN_M,
     LB_N,
     MASS_KG,
     READ,
     REST_HEIGHT_M,
+    ROTORS,
     TURBULENCE,
     WRITTEN,
     load,
@@ -44,6 +46,7 @@ class ControlMode(IntEnum):
     POSITION = 1
     ATTITUDE = 2
     RATES = 3
+    MOTORS = 4
 
 
 class Turbulence(IntEnum):
@@ -208,6 +211,21 @@ class Vehicle:
             write[f"sp/{axis}-rad_s"](float(rate))
         write["sp/thrust"](min(1.0, max(0.0, thrust_norm)))
         write["ap/mode"](ControlMode.RATES)
+
+    def command_motors(self, thrust_norm: Vector) -> None:
+        """Thrust of each rotor (4,) as a fraction of its full thrust, past all loops; order as ``aircraft.ROTORS``."""
+        _finite("motors", thrust_norm)
+        for rotor, thrust in zip(ROTORS, thrust_norm, strict=True):
+            self._set[f"sp/motor-{rotor}"](min(1.0, max(0.0, float(thrust))))
+        self._set["ap/mode"](ControlMode.MOTORS)
+
+    def mount_rotors(self, pos_frd_m: Sequence[tuple[float, float]]) -> None:
+        """Put the rotors elsewhere (4, 2: forward, right), for good; order as ``aircraft.ROTORS``."""
+        for rotor, (forward_m, right_m) in zip(ROTORS, pos_frd_m, strict=True):
+            _finite("rotor position", (forward_m, right_m))
+            place = f"external_reactions/rotor_{rotor}/location"
+            self._set[f"{place}-x-in"](-forward_m / IN_M)  # JSBSim's structural frame: x aft
+            self._set[f"{place}-y-in"](right_m / IN_M)
 
     def command_idle(self) -> None:
         """No control: armed motors idle, integrators rest at zero."""
