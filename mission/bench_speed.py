@@ -25,7 +25,7 @@ from mission.console import FlightConsole, LogTail
 from mission.errors import FlightError
 from mission.flight_log import read_rows
 from mission.flight_plan import FlightPlan, plan_flight
-from mission.runner import FlySettings, check_ports, fly
+from mission.runner import FlySettings, fly, free_instance
 from mission.simulate import fly_in_process
 from sitl.modes import FlightMode
 from sitl.simulation import STEP_MS, SimConfig, Simulation
@@ -43,7 +43,7 @@ SCAN_S = 0.04  # 25 Hz
 
 def measure(seed: int) -> dict[str, Any]:
     """All figures. Raises InputError for a port in use, FlightError when the flight over UDP did not end well."""
-    check_ports(0)
+    instance = free_instance()
     plan = plan_flight("trajectory2", seed)
     bare_s, full_s = _stepping_s()
     return {
@@ -51,7 +51,7 @@ def measure(seed: int) -> dict[str, Any]:
         "in_process_rtf": STRETCH_S / full_s,
         "in_process_ratio": bare_s / full_s,
         "closed_loop_rtf": _closed_loop_rtf(plan),
-        **_over_udp(plan),
+        **_over_udp(plan, instance),
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
     }
@@ -121,11 +121,11 @@ def _closed_loop_rtf(plan: FlightPlan) -> float:
     return flight.sim.t_s / (time.perf_counter() - began_s)
 
 
-def _over_udp(plan: FlightPlan) -> dict[str, Any]:
+def _over_udp(plan: FlightPlan, instance: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with FlightConsole("", LogTail(folder / "navigator.jsonl"), quiet=True) as console:
-            result = fly(plan, FlySettings(), folder, console)
+            result = fly(plan, FlySettings(instance=instance), folder, console)
         if not result.success:
             raise FlightError(f"the flight over UDP failed: {result.reason}")
         steered = {row["t_s"] for row in read_rows(folder / "navigator.jsonl") if row["mode"] != STANDBY}

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import typer
 
 from mission.errors import InputError
+from mission.processes import INSTANCE_MAX
 
 EXTRA_MODULES = {"sitl": ("jsbsim", "mavsdk", "numba", "matplotlib")}  # as pyproject.toml lists them
 SPEED_MIN, SPEED_MAX = 0.1, 100.0
-INSTANCE_MAX = 9  # PX4's ports of instance 10 run into the next range
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Draws wind, start, noise and movers.")]

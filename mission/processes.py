@@ -14,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+INSTANCE_MAX = 9  # PX4's ports of instance 10 run into the next range
 ENDING_WALL_S = 5.0  # patience before a process that was asked to end is killed
 
 

@@ -5,6 +5,7 @@ that an interrupted flight leaves a vehicle that holds and logs that are closed.
 """
 
 import asyncio
+import contextlib
 import json
 import signal
 import socket
@@ -18,7 +19,7 @@ from mission.errors import FlightError, InputError
 from mission.flight_folder import write_inputs, write_result
 from mission.flight_plan import DECIMALS, FlightPlan
 from mission.judge import Result, judge
-from mission.processes import Child, Children, wait_for_end
+from mission.processes import INSTANCE_MAX, Child, Children, wait_for_end
 from mission.simulate import sim_config
 from sitl.link import SPECS
 from sitl.server import RunConfig
@@ -57,6 +58,16 @@ def check_ports(instance: int) -> None:
                 raise InputError(
                     f"port {port + instance} ({user}) is in use: end the other flight or choose --instance N"
                 ) from error
+
+
+def free_instance() -> int:
+    """The first instance whose ports nobody holds. Raises InputError."""
+    for instance in range(INSTANCE_MAX):
+        with contextlib.suppress(InputError):
+            check_ports(instance)
+            return instance
+    check_ports(INSTANCE_MAX)
+    return INSTANCE_MAX
 
 
 def fly(plan: FlightPlan, settings: FlySettings, folder: Path, console: FlightConsole) -> Result:

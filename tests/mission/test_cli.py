@@ -33,8 +33,8 @@ BAD_INPUT = [
     ("fly blocked.yaml", "inside an obstacle"),
     ("fly outside.yaml", "outside the bounds"),
     ("fly nan.yaml", "finite number"),
-    ("fly --out notes.txt/flight", "cannot be written"),
-    ("fly --out full", "is not empty"),
+    ("fly --instance N --out notes.txt/flight", "cannot be written"),
+    ("fly --instance N --out full", "is not empty"),
     ("sitl --world trajectry1", "did you mean 'trajectory1'?"),
     ("sitl --turbulence lite", "did you mean 'light'?"),
     ("sitl --wind nan 0", "not a finite number"),
@@ -81,10 +81,10 @@ def run(words: str) -> int:
 
 @pytest.mark.parametrize(("words", "expected"), BAD_INPUT)
 def test_bad_input_is_one_clear_line_and_leaves_nothing_behind(
-    words: str, expected: str, desk: Path, capfd: pytest.CaptureFixture[str]
+    words: str, expected: str, desk: Path, instance: int, capfd: pytest.CaptureFixture[str]
 ) -> None:
     before = sorted(desk.rglob("*"))
-    assert run(words) == 2
+    assert run(words.replace(" N ", f" {instance} ")) == 2
     out, err = capfd.readouterr()
     assert expected in err
     assert err.count("\n") == 1
