@@ -1,5 +1,6 @@
 """What a person types, and the one line they get when it is wrong."""
 
+import contextlib
 import json
 import socket
 import subprocess
@@ -93,27 +94,20 @@ def test_bad_input_is_one_clear_line_and_leaves_nothing_behind(
 
 
 @pytest.mark.parametrize("words", ["fly --instance {}", "sitl --instance {}", "companion --goal 9 0 --instance {}"])
-def test_a_port_in_use_is_one_clear_line(words: str, desk: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_port_in_use_is_one_clear_line(
+    words: str, desk: Path, instance: int, capfd: pytest.CaptureFixture[str]
+) -> None:
     before = sorted(desk.rglob("*"))
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        instance = next(i for i in range(10) if bound(taken, 14540 + i))
-        vehicle_port = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        with vehicle_port:
-            vehicle_port.bind(("127.0.0.1", 14580 + instance))
-            assert run(words.format(instance)) == 2
+    with contextlib.ExitStack() as stack:
+        for port in (14540, 14580):  # the companion's, the vehicle's
+            taken = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            taken.bind(("0.0.0.0", port + instance))
+        assert run(words.format(instance)) == 2
     out, err = capfd.readouterr()
     assert "is in use" in err
     assert err.count("\n") == 1
     assert out == ""
     assert sorted(desk.rglob("*")) == before
-
-
-def bound(udp: socket.socket, port: int) -> bool:
-    try:
-        udp.bind(("0.0.0.0", port))
-    except OSError:
-        return False
-    return True
 
 
 def test_a_missing_extra_is_named(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
