@@ -156,7 +156,7 @@ class Server:
             self._serve(min(self._pacer.wait_s(self._clock.now_s(), step + 1), POLL_WALL_S))
         elif self.sim.advance(due) is not None:
             self._log_truth()
-            self._voice.deliver(self._voice.bundle(with_status=False))
+            self._voice.deliver(self._voice.bundle(with_status=self.sim.finished))  # else it comes by wall time
         else:
             self.sim.refresh()
             self._voice.stream_by_vehicle()

@@ -305,10 +305,10 @@ def test_a_port_in_use_is_named_and_nothing_stays_open() -> None:
         transport.close()
 
 
-def fly_lockstep(instance: int, log_dir: Path) -> tuple[bytes, list[Any]]:
+def fly_gated(instance: int, log_dir: Path, run: RunConfig = LOCKSTEP) -> tuple[bytes, list[Any]]:
     """The whole gated flight: 8 m north and down; truth and what the companion saw."""
     log_dir.mkdir()
-    with vehicle(instance, LOCKSTEP, log_dir):
+    with vehicle(instance, run, log_dir):
         companion = Client(14540 + instance, 14580 + instance, 1, 191)
         operator = Client(14030 + instance, 14280 + instance)
         stop = threading.Event()
@@ -362,8 +362,8 @@ def fly_in_process() -> tuple[bytes, list[AutopilotStatus]]:
 
 
 def test_two_lockstep_flights_over_udp_have_the_same_truth_and_the_same_scans(tmp_path: Path) -> None:
-    first, seen = fly_lockstep(216, tmp_path / "a")
-    again, _ = fly_lockstep(216, tmp_path / "b")
+    first, seen = fly_gated(216, tmp_path / "a")
+    again, _ = fly_gated(216, tmp_path / "b")
     assert first == again
     inside, statuses = fly_in_process()
     assert first == inside, "and so has the flight without sockets"
@@ -377,6 +377,13 @@ def test_two_lockstep_flights_over_udp_have_the_same_truth_and_the_same_scans(tm
         assert seen[i - 1].time_boot_ms * 1000 == seen[i - 2].time_boot_ms * 1000 == seen[i].time_usec
     packets = list(read_tlog(tmp_path / "a" / "vehicle_companion.tlog"))
     assert len(packets) > 5 * len(scans)
+
+
+def test_the_last_scan_of_a_paced_flight_comes_after_the_news_that_it_is_over(tmp_path: Path) -> None:
+    _, seen = fly_gated(229, tmp_path / "a", RunConfig(speed=20.0, gates=True))
+    last = max(i for i, m in enumerate(seen) if m.get_type() == "OBSTACLE_DISTANCE")
+    heartbeats = [m for m in seen[:last] if m.get_type() == "HEARTBEAT"]
+    assert not heartbeats[-1].base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED
 
 
 def test_lockstep_without_answers_goes_on_paced_and_says_so_once() -> None:
