@@ -17,11 +17,14 @@ from typing import Any, Final
 
 from companion.core.clock import SystemClock
 from companion.core.transport import TransportError
+from companion.core.types import F64
+from sitl import px4_app
 from sitl.link import SPECS, bind, open_links
+from sitl.px4_bridge import Bridge
 from sitl.server import Server
 from sitl.simulation import Simulation
 from sitl.truth_log import TruthFile
-from sitl.vehicle_config import ConfigError, VehicleConfig
+from sitl.vehicle_config import ConfigError, Firmware, VehicleConfig
 
 EXIT_OK: Final = 0
 EXIT_BAD_INPUT: Final = 2
@@ -35,16 +38,16 @@ def run(config: VehicleConfig, say: Say | None = None) -> int:
     tell = say or _to_stderr
     with _stop_on_signals() as stopped, ExitStack() as stack:
         try:
-            server = _open(config, stack, tell)
+            program = (_open_px4 if config.firmware is Firmware.PX4 else _open)(config, stack, tell)
         except (TransportError, ConfigError) as error:
             tell(str(error))
             return EXIT_BAD_INPUT
         except OSError as error:
             tell(f"log folder {config.log_dir} cannot be written: {error.strerror or error}")
             return EXIT_BAD_INPUT
-        tell(_ready_line(config))
-        server.run(stopped)
-        server.flush()
+        tell(px4_app.ready_line(config) if config.firmware is Firmware.PX4 else _ready_line(config))
+        program.run(stopped)
+        program.flush()
     return EXIT_OK
 
 
@@ -58,16 +61,34 @@ def _open(config: VehicleConfig, stack: ExitStack, say: Say) -> Server:
     bound = bind(config.instance, clock)
     for _, transport in bound:
         stack.callback(transport.close)
-    truth = None
-    if config.log_dir is not None:
-        config.log_dir.mkdir(parents=True, exist_ok=True)
-        truth = TruthFile(config.log_dir / "truth.jsonl", sim.spawn_ned_m)
-        stack.callback(truth.close)
-        _write_versions(config, config.log_dir / "sitl.json")
+    truth = _open_truth(config, sim.spawn_ned_m, stack)
     links = open_links(bound, config.system_id, config.log_dir, clock)
     for link in links:
         stack.callback(link.close)
     return Server(sim, links, config.run, clock, config.system_id, truth, say)
+
+
+def _open_px4(config: VehicleConfig, stack: ExitStack, say: Say) -> Bridge:
+    """The same for the bridge to a real PX4."""
+    clock = SystemClock()
+    try:
+        plant = px4_app.open_plant(config)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    links = px4_app.open_links(config, plant, clock, stack, say)
+    truth = _open_truth(config, plant.spawn_ned_m, stack)
+    return px4_app.open_bridge(config, plant, links, clock, truth, say)
+
+
+def _open_truth(config: VehicleConfig, spawn_ned_m: F64, stack: ExitStack) -> TruthFile | None:
+    """The log folder with what it holds from the start. Raises OSError."""
+    if config.log_dir is None:
+        return None
+    config.log_dir.mkdir(parents=True, exist_ok=True)
+    truth = TruthFile(config.log_dir / "truth.jsonl", spawn_ned_m)
+    stack.callback(truth.close)
+    _write_versions(config, config.log_dir / "sitl.json")
+    return truth
 
 
 @contextlib.contextmanager

@@ -263,6 +263,6 @@ def _or_absent(vector: Vector | None) -> Vector:
     return ABSENT if vector is None else vector
 
 
-def _finite(what: str, values: Sequence[float]) -> None:
+def _finite(what: str, values: Vector) -> None:
     if not all(math.isfinite(value) for value in values):
         raise ValueError(f"{what} must be finite, got {[float(value) for value in values]}")

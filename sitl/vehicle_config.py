@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,13 @@ class ConfigError(ValueError):
     """A configuration is wrong; the text is one line."""
 
 
+class Firmware(StrEnum):
+    """Who flies the aircraft?"""
+
+    EMBEDDED = "embedded"  # our own flight stack
+    PX4 = "px4"  # a real PX4 at the simulator port
+
+
 @dataclass(frozen=True, slots=True)
 class VehicleConfig:
     """Everything that ``sitl.app.run`` needs; ``log_dir`` takes truth.jsonl, sitl.json and *.tlog."""
@@ -29,6 +37,7 @@ class VehicleConfig:
     instance: int = 0  # adds to every port
     system_id: int = 1
     log_dir: Path | None = None
+    firmware: Firmware = Firmware.EMBEDDED
 
     def to_json(self) -> dict[str, Any]:
         """Plain values; ``from_json`` gives the same configuration back."""
@@ -43,6 +52,7 @@ class VehicleConfig:
             "instance": self.instance,
             "system_id": self.system_id,
             "log_dir": str(self.log_dir) if self.log_dir is not None else None,
+            "firmware": self.firmware.value,
         }
 
 
@@ -57,6 +67,7 @@ def from_json(data: dict[str, Any]) -> VehicleConfig:
             instance=int(data.get("instance", 0)),
             system_id=int(data.get("system_id", 1)),
             log_dir=Path(data["log_dir"]) if data.get("log_dir") else None,
+            firmware=Firmware(data.get("firmware", Firmware.EMBEDDED)),
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ConfigError(f"vehicle configuration: {type(error).__name__}: {error}") from error

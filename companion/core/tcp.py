@@ -46,6 +46,11 @@ class Tcp:
         """The local port of the listener, or 0."""
         return int(self._listener.getsockname()[1]) if self._listener is not None else 0
 
+    @property
+    def clients(self) -> int:
+        """Open connections."""
+        return len(self._streams)
+
     def send(self, data: bytes) -> None:
         """To every open connection."""
         self._renew()
