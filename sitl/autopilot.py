@@ -10,22 +10,18 @@ from typing import Final
 
 from companion.core.types import LandedState, VehicleState
 from sitl.answers import ACCEPTED, CRITICAL, INFO, CommandResult, Result, StatusText
-from sitl.demand import IDLE, Demand, TrajectorySetpoint
+from sitl.demand import IDLE, Demand, OffboardSetpoint
 from sitl.failsafe import Failsafe, offboard_loss
+from sitl.home import Home, here
 from sitl.land_detector import LandDetector
-from sitl.modes import ARMABLE, FLYABLE, TITLES, FlightMode
+from sitl.modes import ARMABLE, AUTONOMOUS, FLYABLE, MANUAL, TITLES, FlightMode
+from sitl.pilot import Sticks
 from sitl.px4_params import ParamStore
-from sitl.steering import Behaviour, Steering, asks_to_climb
+from sitl.steering import BEHAVIOURS, Behaviour, Steering
 
 READY_S: Final = 2.5  # PX4 v1.16 SIH: prearm checks pass two to three seconds after boot
 
-_BEHAVIOUR: Final = {
-    FlightMode.HOLD: Behaviour.HOLD,
-    FlightMode.TAKEOFF: Behaviour.TAKEOFF,
-    FlightMode.LAND: Behaviour.LAND,
-    FlightMode.RTL: Behaviour.RETURN,
-    FlightMode.OFFBOARD: Behaviour.OFFBOARD,
-}
+_STICKS_LOST: Final = {1: FlightMode.HOLD, 3: FlightMode.LAND, 5: FlightMode.TERMINATION}  # NAV_RCL_ACT; else Return
 
 
 class Autopilot:
@@ -39,15 +35,16 @@ class Autopilot:
         self.has_flown = False
         self.armed_time_s = 0.0  # summed up
         self.demand: Demand = IDLE
+        self.home: Home | None = None  # None until the position is known
         self.texts: list[StatusText] = []
         self._state: VehicleState | None = None
         self._detector = LandDetector()
-        self._steering = Steering(self.params)
+        self.steering = Steering(self.params)
         self._ready_said = False
         self._armed_s = math.inf
         self._landed_s = math.inf  # since when armed and landed
         self._heard_s = -math.inf  # when the last setpoint of any kind arrived
-        self._setpoint: TrajectorySetpoint | None = None
+        self._setpoint: OffboardSetpoint | None = None
 
     # --- what others see --------------------------------------------------------------------------------------
 
@@ -67,6 +64,16 @@ class Autopilot:
         return self.failsafe.mode if self.failsafe is not None else self.user_mode
 
     @property
+    def state(self) -> VehicleState | None:
+        """The estimate of the last update."""
+        return self._state
+
+    @property
+    def motors_on(self) -> bool:
+        """Do the rotors turn?"""
+        return self.armed and self._behaviour() is not Behaviour.CUT
+
+    @property
     def landed(self) -> bool:
         """What the land detector says."""
         return self._detector.landed
@@ -78,7 +85,8 @@ class Autopilot:
             return LandedState.ON_GROUND
         if self.mode is FlightMode.TAKEOFF:
             return LandedState.TAKEOFF
-        return LandedState.LANDING if self.mode is FlightMode.LAND else LandedState.IN_AIR
+        coming_down = self.mode is FlightMode.RTL and self.steering.landing
+        return LandedState.LANDING if self.mode is FlightMode.LAND or coming_down else LandedState.IN_AIR
 
     def offboard_available(self, t_s: float) -> bool:
         """Is the setpoint stream fresh enough for OFFBOARD at ``t_s``?"""
@@ -92,24 +100,36 @@ class Autopilot:
             self._setpoint = None  # of an older stream
         self._heard_s = max(self._heard_s, t_s)
 
-    def use_setpoint(self, setpoint: TrajectorySetpoint) -> None:
+    def hear_sticks(self, sticks: Sticks) -> None:
+        """MANUAL_CONTROL arrived."""
+        pilot = self.steering.pilot
+        pilot.hear(self.t_s, sticks)
+        if self.armed and self.mode in AUTONOMOUS and pilot.takes_over(self.t_s):
+            self._say(INFO, "Pilot took over using sticks")
+            self._change_mode(FlightMode.POSCTL)
+
+    def set_home(self, home: Home) -> None:
+        """From now on this is home."""
+        self.home = self.steering.home = home
+
+    def use_setpoint(self, setpoint: OffboardSetpoint) -> None:
         """From now on this is what OFFBOARD flies."""
         self._setpoint = setpoint
         if self._state is not None and self._steers() and self.mode is FlightMode.OFFBOARD:
-            self.demand = self._steering.demand(Behaviour.OFFBOARD, self._state, setpoint)
+            self.demand = self.steering.demand(Behaviour.OFFBOARD, self._state, setpoint)
 
     def command_arm(self, force: bool = False) -> CommandResult:
         """MAV_CMD_COMPONENT_ARM_DISARM with 1."""
         if self.armed:
             return ACCEPTED
-        allowed = self.user_mode in ARMABLE and (
-            self.user_mode is not FlightMode.OFFBOARD or self.offboard_available(self.t_s)
-        )
+        allowed = self.user_mode in ARMABLE | MANUAL and self._flyable(self.user_mode)
         if not force and not (self.ready and allowed):
             return self._refuse("Arming denied: Resolve system health failures first")
         self.armed = True
+        if self._state is not None and self.params["COM_HOME_EN"] and not (self.home is not None and self.home.manual):
+            self.set_home(here(self._state))
         self._armed_s = self._landed_s = self.t_s
-        self._steering.restart()
+        self.steering.restart()
         self._say(INFO, "Armed by external command")
         return ACCEPTED
 
@@ -126,7 +146,8 @@ class Autopilot:
         """MAV_CMD_DO_SET_MODE; None is a mode that PX4 does not have."""
         if mode is None:
             return CommandResult(Result.TEMPORARILY_REJECTED, "Unsupported mode")
-        if self.armed and not self._flyable(mode):
+        stuck = self.user_mode is FlightMode.TERMINATION and mode is not self.user_mode
+        if self.armed and (stuck or not self._flyable(mode)):
             return self._refuse(f"Switching to {TITLES[mode]} is currently not available")
         self._change_mode(mode)
         return ACCEPTED
@@ -141,8 +162,8 @@ class Autopilot:
         elif down_m > here_m:
             self._say(CRITICAL, "Already higher than takeoff altitude")
         self._change_mode(FlightMode.TAKEOFF)
-        self._steering.restart()
-        self._steering.takeoff_down_m = down_m
+        self.steering.restart()
+        self.steering.takeoff_down_m = down_m
         return ACCEPTED
 
     def command_land(self) -> CommandResult:
@@ -158,27 +179,30 @@ class Autopilot:
         self._state = state
         if not self._ready_said and self.ready:
             self._ready_said = True
+            if self.home is None:
+                self.set_home(here(state))
             self._say(INFO, "Ready for takeoff!")
         self._detect_ground(state, contact)
         if not self.armed:
             self.demand = IDLE
             return
         self._watch_stream()
+        self._watch_sticks()
         self._watch_disarm()
         if not self._steers():
             self.demand = IDLE
             return
-        self.demand = self._steering.demand(self._behaviour(), state, self._setpoint)
-        if self.mode is FlightMode.TAKEOFF and self._steering.arrived(state):
+        self.demand = self.steering.demand(self._behaviour(), state, self._setpoint)
+        if self.mode is FlightMode.TAKEOFF and self.steering.arrived(state):
             self.user_mode = FlightMode.HOLD
-            self._steering.settle()
+            self.steering.settle()
 
     def _detect_ground(self, state: VehicleState, contact: bool) -> None:
         if not self._detector.update(state, contact, self._wants_up()):
             return
         if self.landed:
             self._landed_s = state.t_s
-            self._steering.restart()
+            self.steering.restart()
             self._say(INFO, "Landing detected")
         else:
             self.has_flown = True
@@ -189,13 +213,20 @@ class Autopilot:
         lost = self.user_mode is FlightMode.OFFBOARD and not self.offboard_available(self.t_s)
         if lost and self.failsafe is None:
             self.failsafe = offboard_loss(int(self.params["COM_OBL_RC_ACT"]))
-            self._steering.restart()
+            self.steering.restart()
             self._say(CRITICAL, "Failsafe activated")
             if self.failsafe.behaviour is Behaviour.CUT:
                 self._disarm("Disarmed by failsafe")
         elif not lost and self.failsafe is not None:
             self.failsafe = None
-            self._steering.restart()
+            self.steering.restart()
+
+    def _watch_sticks(self) -> None:
+        if self.mode not in MANUAL or self.user_mode not in MANUAL or self.steering.pilot.present(self.t_s):
+            return
+        self._say(CRITICAL, "Manual control lost")
+        self._say(CRITICAL, "Failsafe activated")
+        self._change_mode(_STICKS_LOST.get(int(self.params["NAV_RCL_ACT"]), FlightMode.RTL))
 
     def _watch_disarm(self) -> None:
         if not (self.armed and self.landed):
@@ -207,7 +238,7 @@ class Autopilot:
 
     def _steers(self) -> bool:
         """Do the loops act? Not while disarmed, spooling up, or on the ground without a wish to leave it."""
-        if not self.armed:
+        if not self.motors_on:
             return False
         if not self.landed:
             return True
@@ -216,15 +247,14 @@ class Autopilot:
     def _wants_up(self) -> bool:
         if not self.armed or self._state is None:
             return False
-        behaviour = self._behaviour()
-        if behaviour is Behaviour.OFFBOARD:
-            return asks_to_climb(self._setpoint, self._state)
-        return behaviour is Behaviour.TAKEOFF
+        return self.steering.climbs(self._behaviour(), self._state, self._setpoint)
 
     def _behaviour(self) -> Behaviour:
-        return self.failsafe.behaviour if self.failsafe is not None else _BEHAVIOUR.get(self.user_mode, Behaviour.HOLD)
+        return self.failsafe.behaviour if self.failsafe is not None else BEHAVIOURS.get(self.user_mode, Behaviour.HOLD)
 
     def _flyable(self, mode: FlightMode) -> bool:
+        if mode in MANUAL:
+            return self.steering.pilot.present(self.t_s)
         return mode in FLYABLE and (mode is not FlightMode.OFFBOARD or self.offboard_available(self.t_s))
 
     def _change_mode(self, mode: FlightMode) -> None:
@@ -232,17 +262,19 @@ class Autopilot:
             return
         self.user_mode = mode
         self.failsafe = None
-        self._steering.restart()
+        self.steering.restart()
         if mode is FlightMode.LAND and self.armed:
             self._say(INFO, "Landing at current position")
         elif mode is FlightMode.RTL and self.armed:
             self._say(INFO, "RTL: start return")
+        elif mode is FlightMode.TERMINATION and self.armed:
+            self._say(CRITICAL, "Flight termination active")
 
     def _disarm(self, text: str) -> None:
         self.armed = False
         self.failsafe = None
         self.demand = IDLE
-        if self.user_mode is not FlightMode.OFFBOARD:
+        if self.user_mode is not FlightMode.OFFBOARD and self.user_mode not in MANUAL:
             self.user_mode = FlightMode.HOLD
         self._say(INFO, text)
 

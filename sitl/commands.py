@@ -116,4 +116,3 @@ _HANDLERS: Final[Mapping[int, Handler]] = {
     mav.MAV_CMD_REQUEST_PROTOCOL_VERSION: _protocol,
     mav.MAV_CMD_GET_HOME_POSITION: _home,
 }
-

@@ -18,6 +18,8 @@ class Loop(Enum):
 
     IDLE = "idle"  # rotors turn, no lift
     POSITION = "position"
+    ATTITUDE = "attitude"
+    RATES = "rates"
 
 
 def no_axes() -> F64:
@@ -35,6 +37,9 @@ class Demand:
     acc_ned_m_s2: F64  # (3,)
     yaw_rad: float  # NaN: turn at yaw_rate_rad_s
     yaw_rate_rad_s: float
+    q_ned_frd: F64 | None = None  # (4,) of Loop.ATTITUDE
+    rates_frd_rad_s: F64 | None = None  # (3,) of Loop.RATES
+    thrust_norm: float = 0.0  # of both: fraction of full thrust
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +52,17 @@ class TrajectorySetpoint:
     yaw_rad: float  # NaN: not given
     yaw_rate_rad_s: float  # NaN: not given
 
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AttitudeSetpoint:
+    """What an OFFBOARD client asks for below the position loop: an attitude, or body rates where that is None."""
+
+    q_ned_frd: F64 | None  # (4,)
+    rates_frd_rad_s: F64  # (3,)
+    thrust_norm: float
+
+
+OffboardSetpoint = TrajectorySetpoint | AttitudeSetpoint
 
 IDLE: Final = Demand(Loop.IDLE, no_axes(), no_axes(), no_axes(), math.nan, math.nan)
 
@@ -62,4 +78,25 @@ def position_demand(
         no_axes() if acc_ned_m_s2 is None else acc_ned_m_s2,
         yaw_rad,
         0.0,
+    )
+
+
+def attitude_demand(q_ned_frd: F64, thrust_norm: float) -> Demand:
+    """A demand of attitude and collective thrust."""
+    return Demand(
+        Loop.ATTITUDE, no_axes(), no_axes(), no_axes(), math.nan, 0.0, q_ned_frd=q_ned_frd, thrust_norm=thrust_norm
+    )
+
+
+def rates_demand(rates_frd_rad_s: F64, thrust_norm: float) -> Demand:
+    """A demand of body rates and collective thrust."""
+    return Demand(
+        Loop.RATES,
+        no_axes(),
+        no_axes(),
+        no_axes(),
+        math.nan,
+        0.0,
+        rates_frd_rad_s=rates_frd_rad_s,
+        thrust_norm=thrust_norm,
     )

@@ -97,15 +97,13 @@ class Land:
     north_m: float
     east_m: float
     yaw_rad: float
-    fast_m_s: float  # above high_m
-    slow_m_s: float  # below low_m
-    high_m: float
-    low_m: float
+    params: ParamStore
+    home_down_m: float = 0.0
 
     def demand(self, state: VehicleState) -> Demand:
         """The place, and a descent that slows down near the ground (height above home)."""
-        share = (-float(state.pos_ned_m[2]) - self.low_m) / max(self.high_m - self.low_m, 1e-3)
-        speed_m_s = self.slow_m_s + min(max(share, 0.0), 1.0) * (self.fast_m_s - self.slow_m_s)
+        height_m = self.home_down_m - float(state.pos_ned_m[2])
+        speed_m_s = descent_m_s(height_m, self.params, self.params["MPC_Z_V_AUTO_DN"])
         return position_demand(
             np.array([self.north_m, self.east_m, math.nan]),
             self.yaw_rad,
@@ -154,28 +152,27 @@ def takeoff(state: VehicleState, to_down_m: float, params: ParamStore) -> GoTo:
     return GoTo(ramp, yaw_rad(state.q_ned_frd))
 
 
-def land(state: VehicleState, params: ParamStore) -> Land:
+def land(state: VehicleState, params: ParamStore, home_down_m: float = 0.0) -> Land:
     """Brake and come down."""
     north_m, east_m, _ = stopping_point(state).tolist()
-    return Land(
-        north_m,
-        east_m,
-        yaw_rad(state.q_ned_frd),
-        params["MPC_Z_V_AUTO_DN"],
-        params["MPC_LAND_SPEED"],
-        params["MPC_LAND_ALT1"],
-        params["MPC_LAND_ALT2"],
-    )
+    return Land(north_m, east_m, yaw_rad(state.q_ned_frd), params, home_down_m)
 
 
-def return_legs(state: VehicleState, params: ParamStore) -> tuple[F64, ...]:
-    """Way points (3,) of Return to the local origin: up, then across. Near home the climb is left out."""
+def descent_m_s(height_m: float, params: ParamStore, fast_m_s: float) -> float:
+    """How fast to come down at a height above home: ``fast_m_s`` high up, MPC_LAND_SPEED near the ground."""
+    slow_m_s, high_m, low_m = params["MPC_LAND_SPEED"], params["MPC_LAND_ALT1"], params["MPC_LAND_ALT2"]
+    share = (height_m - low_m) / max(high_m - low_m, 1e-3)
+    return slow_m_s + min(max(share, 0.0), 1.0) * (fast_m_s - slow_m_s)
+
+
+def return_legs(state: VehicleState, params: ParamStore, home_ned_m: F64) -> tuple[F64, ...]:
+    """Way points (3,) of Return to home: up, then across. Near home the climb is left out."""
     here = stopping_point(state)
-    distance_m = math.hypot(here[0], here[1])
+    distance_m = math.hypot(*(here - home_ned_m)[:2])
     # PX4's cone of 45 degrees: no higher than twice the distance still to go.
     height_m = min(float(params["RTL_RETURN_ALT"]), 2.0 * distance_m) if distance_m > RTL_NEAR_M else 0.0
-    down_m = min(float(here[2]), -height_m)
-    return np.array([here[0], here[1], down_m]), np.array([0.0, 0.0, down_m])
+    down_m = min(float(here[2]), float(home_ned_m[2]) - height_m)
+    return np.array([here[0], here[1], down_m]), np.array([home_ned_m[0], home_ned_m[1], down_m])
 
 
 def leg(state: VehicleState, to_ned_m: F64, params: ParamStore) -> GoTo:

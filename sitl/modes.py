@@ -54,9 +54,33 @@ TITLES: Final = {
     FlightMode.PRECISION_LAND: "Precision Landing",
 }
 
-# Modes that steer without sticks, mission or target; OFFBOARD only while its stream is fresh.
-FLYABLE: Final = frozenset({FlightMode.HOLD, FlightMode.TAKEOFF, FlightMode.LAND, FlightMode.RTL, FlightMode.OFFBOARD})
-# Modes in which PX4 lets the motors start.
+# Modes that need sticks.
+MANUAL: Final = frozenset(
+    {
+        FlightMode.MANUAL,
+        FlightMode.ALTCTL,
+        FlightMode.POSCTL,
+        FlightMode.POSITION_SLOW,
+        FlightMode.ACRO,
+        FlightMode.STABILIZED,
+    }
+)
+# Modes that steer without sticks and mission; OFFBOARD only while its stream is fresh.
+FLYABLE: Final = frozenset(
+    {
+        FlightMode.HOLD,
+        FlightMode.TAKEOFF,
+        FlightMode.LAND,
+        FlightMode.RTL,
+        FlightMode.OFFBOARD,
+        FlightMode.ORBIT,
+        FlightMode.FOLLOW,
+        FlightMode.TERMINATION,
+    }
+)
+# Modes that a pilot's stick ends (COM_RC_OVERRIDE).
+AUTONOMOUS: Final = FLYABLE - {FlightMode.OFFBOARD, FlightMode.TERMINATION} | {FlightMode.MISSION}
+# Modes in which PX4 lets the motors start; those of MANUAL too, with sticks.
 ARMABLE: Final = frozenset({FlightMode.HOLD, FlightMode.TAKEOFF, FlightMode.OFFBOARD})
 
 _AUTO_FLAGS: Final = (

@@ -18,7 +18,7 @@ from companion.core.codec import from_ms, quantise_scan, quantise_state, to_ms
 from companion.core.types import F64, AutopilotStatus, Scan, Setpoint, VehicleState
 from sitl.autopilot import Autopilot
 from sitl.contact import ContactWatch
-from sitl.demand import Demand, Loop, TrajectorySetpoint
+from sitl.demand import Demand, Loop, OffboardSetpoint
 from sitl.lidar import Lidar, LidarParams
 from sitl.modes import FlightMode
 from sitl.px4_params import ParamStore
@@ -69,7 +69,7 @@ class Simulation:
         self.scan: Scan | None = None
         self._delay_steps = math.ceil((self.config.latency_s + self.config.lidar.latency_s) * 1e3 / STEP_MS - 1e-9)
         self._step = 0
-        self._queue: deque[tuple[int, TrajectorySetpoint]] = deque()  # step from which it is in force
+        self._queue: deque[tuple[int, OffboardSetpoint]] = deque()  # step from which it is in force
         self._vehicle = Vehicle(STEP_MS / 1e3)
         self.autopilot = Autopilot(ParamStore(loops=self._vehicle.parameters))
         for name, value in self.config.px4_params.items():
@@ -132,7 +132,7 @@ class Simulation:
         """The companion's answer to a scan; in force one latency after ``setpoint.t_s``."""
         self.submit_trajectory(of_companion(setpoint), to_ms(setpoint.t_s))
 
-    def submit_trajectory(self, setpoint: TrajectorySetpoint, scan_ms: int | None) -> None:
+    def submit_trajectory(self, setpoint: OffboardSetpoint, scan_ms: int | None) -> None:
         """A setpoint from the wire; ``scan_ms``: time of the scan that it answers, None: in force at once."""
         due = self._step if scan_ms is None else max(self._step, scan_ms // STEP_MS + self._delay_steps)
         while self._queue and self._queue[-1][0] >= due:
@@ -208,15 +208,21 @@ class Simulation:
 
     def _apply(self) -> None:
         ap = self.autopilot
-        if ap.armed is not self._armed:
-            self._armed = ap.armed
-            self._vehicle.set_motors(ap.armed)
+        if ap.motors_on is not self._armed:
+            self._armed = ap.motors_on
+            self._vehicle.set_motors(self._armed)
         demand = ap.demand
         if demand is self._applied:
             return
         self._applied = demand
         if demand.loop is Loop.IDLE:
             self._vehicle.command_idle()
+            return
+        if demand.q_ned_frd is not None:
+            self._vehicle.command_attitude(demand.q_ned_frd, demand.thrust_norm)
+            return
+        if demand.rates_frd_rad_s is not None:
+            self._vehicle.command_rates(demand.rates_frd_rad_s.tolist(), demand.thrust_norm)
             return
         self._vehicle.command_position(
             demand.pos_ned_m.tolist(),
