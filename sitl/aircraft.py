@@ -51,6 +51,7 @@ WRITTEN = (
     "use/yaw",
     "sp/thrust",
     *(f"sp/motor-{rotor}" for rotor in ROTORS),
+    *(f"rotor/effectiveness-{rotor}" for rotor in ROTORS),
     *(f"external_reactions/rotor_{rotor}/location-{axis}-in" for rotor in ROTORS for axis in "xy"),
     *(f"atmosphere/wind-{axis}-fps" for axis in ("north", "east", "down")),
     "atmosphere/turb-type",

@@ -133,6 +133,7 @@ class Vehicle:
         fdm.reset_to_initial_conditions(0)
         write["simulation/randomseed"](1 + seed % _SEEDS)
         write["ap/rest-height-m"](REST_HEIGHT_M)
+        self.set_effectiveness((1.0,) * len(ROTORS))
         for name, value in self._params.items():
             self._param_nodes[name].set_double_value(value)
         self._blow(wind or Wind())
@@ -227,6 +228,17 @@ class Vehicle:
             self._set[f"{place}-x-in"](-forward_m / IN_M)  # JSBSim's structural frame: x aft
             self._set[f"{place}-y-in"](right_m / IN_M)
 
+    def set_effectiveness(self, share: Vector) -> None:
+        """Share of its thrust that each rotor gives (4,); order as ``aircraft.ROTORS``, until the next reset."""
+        for rotor, value in zip(ROTORS, share, strict=True):
+            self._set[f"rotor/effectiveness-{rotor}"](min(1.0, max(0.0, float(value))))
+
+    def blow(self, mean_ned_m_s: Vector) -> None:
+        """Change the mean wind; turbulence stays as it is."""
+        _finite("wind", mean_ned_m_s)
+        for axis, speed in zip(("north", "east", "down"), mean_ned_m_s, strict=True):
+            self._set[f"atmosphere/wind-{axis}-fps"](speed / FT_M)
+
     def command_idle(self) -> None:
         """No control: armed motors idle, integrators rest at zero."""
         self._set["ap/mode"](ControlMode.IDLE)
@@ -252,8 +264,7 @@ class Vehicle:
 
     def _blow(self, wind: Wind) -> None:
         write = self._set
-        for axis, speed in zip(("north", "east", "down"), wind.mean_ned_m_s, strict=True):
-            write[f"atmosphere/wind-{axis}-fps"](speed / FT_M)
+        self.blow(wind.mean_ned_m_s)
         write["atmosphere/turb-type"](_MILSPEC if wind.turbulence else 0.0)
         write[f"{TURBULENCE}/windspeed_at_20ft_AGL-fps"](wind.turbulence.w20_m_s / FT_M)
         write[f"{TURBULENCE}/severity"](float(wind.turbulence))
