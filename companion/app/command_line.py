@@ -55,7 +55,8 @@ def parser(prog: str = "python -m companion", goal_required: bool = True) -> arg
     )
     add = options.add_argument
     add("--vehicle", metavar="URL", help=f"the autopilot, as MAVSDK writes it (default: {VEHICLE_URL})")
-    add("--lidar", metavar="URL", help="where OBSTACLE_DISTANCE comes from (default: the vehicle's link)")
+    lidar_help = "a LiDAR of its own: URL of one that speaks MAVLink, replay:FILE, or lds2d:MODEL:/dev/DEVICE"
+    add("--lidar", metavar="URL", help=f"{lidar_help} (default: scans come over the vehicle's link)")
     goal_help = "NORTH EAST [DOWN] from where it booted"
     add("--goal", metavar="M", type=_number, nargs="+", required=goal_required, help=goal_help)
     add("--cruise", metavar="M_S", type=_number, default=CRUISE_M_S, help="cap of the speed (default: %(default)s)")

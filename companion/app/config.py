@@ -7,6 +7,7 @@ from pathlib import Path
 
 from companion.core.task import Task
 from companion.core.url import UrlError, parse_url
+from companion.link.lidar_url import parse_lidar
 from companion.navigator import Params
 
 VEHICLE_URL = "udpin://0.0.0.0:14540"  # where PX4 sends to a companion
@@ -31,7 +32,7 @@ class CompanionConfig:
     task: Task
     log_dir: Path
     vehicle_url: str = VEHICLE_URL
-    lidar_url: str | None = None  # None: scans come over the vehicle's link
+    lidar_url: str | None = None  # as ``link.lidar_url`` reads it; None: scans come over the vehicle's link
     params: Params = field(default_factory=Params)
     engage: Engage = Engage.WAIT
     connect_timeout_s: float = 30.0  # wall time until the vehicle must have been heard
@@ -53,8 +54,9 @@ def check(config: CompanionConfig) -> None:
         value = getattr(config, name)
         if not (math.isfinite(value) and value > 0.0):
             raise ConfigError(f"{name} = {value} must be a positive number of seconds")
-    for url in filter(None, (config.vehicle_url, config.lidar_url)):
-        try:
-            parse_url(url)
-        except UrlError as error:
-            raise ConfigError(str(error)) from error
+    try:
+        parse_url(config.vehicle_url)
+        if config.lidar_url is not None:
+            parse_lidar(config.lidar_url)
+    except UrlError as error:
+        raise ConfigError(str(error)) from error

@@ -24,6 +24,8 @@ from companion.core.mavlink import Connection
 from companion.core.transport import wait_readable
 from companion.core.types import Setpoint
 from companion.link.assembler import Assembler
+from companion.link.lidar import Lidar
+from companion.link.vehicle_clock import VehicleClock
 
 Message = Any  # a MAVLink_*_message object
 
@@ -44,20 +46,24 @@ class Companion:
     def __init__(
         self,
         config: CompanionConfig,
-        links: list[Connection],
+        vehicle: Connection,
+        lidar: Lidar | None,
         logs: FlightLogs,
         navigator: Navigator,
         clock: Clock,
     ) -> None:
-        """``links``: the vehicle's connection, then the LiDAR's if it has its own."""
+        """``lidar`` None: the vehicle passes the scans on."""
         self.exit_code: int | None = None
         self.reason = ""
         self.skipped_scans = 0  # overtaken by a newer one before they could be answered
         self.on_status: OnStatus | None = None
         self.say: Say = _silent
         self._config = config
-        self._links = links
-        self._vehicle = links[0]
+        self._vehicle = vehicle
+        self._lidar = lidar
+        self.links = [vehicle, *(lidar.links() if lidar is not None else ())]
+        self._waits_on = [vehicle.transport, *(lidar.waits_on() if lidar is not None else ())]
+        self._vehicle_clock = VehicleClock()
         self._logs = logs
         self._clock = clock
         self._assembler = Assembler(config.params.link)
@@ -83,12 +89,13 @@ class Companion:
 
     def turn(self, stop: StopRequest | None = None, wait_s: float = TURN_S) -> None:
         """Wait for messages, answer them, look after everything else."""
-        wait_readable([link.transport for link in self._links], wait_s, self._clock)
-        for link in self._links:
-            arrived_s = self._clock.now_s()
-            for message in link.receive():
-                if self.exit_code is None:
-                    self._handle(message, arrived_s)
+        wait_readable(self._waits_on, wait_s, self._clock)
+        arrived_s = self._clock.now_s()
+        for message in self._vehicle.receive():
+            if self.exit_code is None:
+                self._handle(message, arrived_s)
+        if self._lidar is not None:
+            self._look_through(self._lidar, arrived_s)
         self._take_pending()
         now_s = self._clock.now_s()
         if self.exit_code is None and stop is not None and stop.number is not None:
@@ -97,6 +104,14 @@ class Companion:
             self._look_after_vehicle(now_s)
         self._send_heartbeat(now_s)
         self._show_status(now_s)
+
+    def _look_through(self, lidar: Lidar, arrived_s: float) -> None:
+        """Scans of a LiDAR of our own; the autopilot is told of those that it cannot hear itself."""
+        self._vehicle_clock.update(self._assembler.vehicle_time_s, arrived_s)
+        arrived_s = self._clock.now_s()
+        for message in lidar.receive(self._vehicle_clock):
+            if self.exit_code is None:
+                self._handle(self._vehicle.relay(message) if lidar.local else message, arrived_s)
 
     # --- messages -------------------------------------------------------------------------------------------------
 
@@ -118,7 +133,7 @@ class Companion:
     def _heard(self, now_s: float) -> None:
         if self._watch.heard_s is None:
             system = self._assembler.vehicle_system or self._config.system
-            for link in self._links:
+            for link in self.links:
                 link.speak_as(system, codec.COMPANION_COMPONENT)
             self._heartbeat_s = now_s - HEARTBEAT_S  # introduce ourselves at once
             self._tell(f"vehicle {system} heard on {self._vehicle.transport.name}")
@@ -262,7 +277,7 @@ class Companion:
     def _send_heartbeat(self, now_s: float) -> None:
         if now_s - self._heartbeat_s >= HEARTBEAT_S:
             self._heartbeat_s = now_s
-            for link in self._links:
+            for link in self.links:
                 link.send(codec.encode_companion_heartbeat())
 
     def _show_status(self, now_s: float) -> None:

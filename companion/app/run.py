@@ -11,15 +11,15 @@ from companion import navigator as companion_navigator
 from companion.app.config import CompanionConfig, ConfigError, check
 from companion.app.logs import FlightLogs, LogFolderError
 from companion.app.memory_use import peak_rss_mb
+from companion.app.opening import connect, open_all
 from companion.app.process import Companion, OnStatus, Say
 from companion.app.session import Navigator
 from companion.app.signals import StopRequest, stop_on_signals
 from companion.app.status import ExitCode, Summary
-from companion.core import codec, params
+from companion.core import params
 from companion.core.clock import Clock, SystemClock
-from companion.core.mavlink import Connection
-from companion.core.transport import Transport, TransportError
-from companion.core.url import open_url
+from companion.core.transport import TransportError
+from companion.link.lidar import LidarError
 
 DISTRIBUTIONS = ("swiftnav", "numpy", "scipy", "pymavlink")
 
@@ -47,35 +47,27 @@ def fly(
     with ExitStack() as stack:
         try:
             check(config)
-            transports = _open(config, clock, stack)
+            opened = open_all(config, clock, stack)
             logs = stack.enter_context(closing(FlightLogs(config.log_dir)))
-        except (ConfigError, TransportError, LogFolderError) as error:
+        except (ConfigError, TransportError, LidarError, LogFolderError) as error:
             say(str(error))
             return Summary(int(ExitCode.BAD_INPUT), str(error), 0, "", str(config.log_dir))
         if stop is None:
             stop = StopRequest()
             stack.enter_context(stop_on_signals(stop))
-        links = [Connection(t, config.system, codec.COMPANION_COMPONENT, logs, clock) for t in transports]
+        vehicle, lidar = connect(opened, config, logs, clock)
         logs.event("start", **_described(config))
-        companion = Companion(config, links, logs, navigator, clock)
+        companion = Companion(config, vehicle, lidar, logs, navigator, clock)
         companion.say, companion.on_status = say, on_status
         while companion.exit_code is None:
             companion.turn(stop)
-        return _ended(companion, config, links, logs, say)
+        return _ended(companion, config, logs, say)
 
 
-def _open(config: CompanionConfig, clock: Clock, stack: ExitStack) -> list[Transport]:
-    """The vehicle's transport and the LiDAR's, closed with the stack. Raises TransportError."""
-    urls = [config.vehicle_url] if config.lidar_url is None else [config.vehicle_url, config.lidar_url]
-    return [stack.enter_context(closing(open_url(url, clock))) for url in urls]
-
-
-def _ended(
-    companion: Companion, config: CompanionConfig, links: list[Connection], logs: FlightLogs, say: Say
-) -> Summary:
+def _ended(companion: Companion, config: CompanionConfig, logs: FlightLogs, say: Say) -> Summary:
     assert companion.exit_code is not None
     summary = Summary(companion.exit_code, companion.reason, logs.ticks, logs.record_sha256, str(config.log_dir))
-    counts = {link.transport.name: dataclasses.asdict(link.counts) for link in links}
+    counts = {link.transport.name: dataclasses.asdict(link.counts) for link in companion.links}
     facts = {
         "links": counts,
         "dropped_scans": companion.dropped_scans,

@@ -112,13 +112,17 @@ class Connection:
         component: int,
         log: PacketLog | None = None,
         clock: Clock | None = None,
+        ignored: frozenset[int] = frozenset(),
     ) -> None:
+        """``ignored``: ids of messages that are neither delivered nor logged."""
         self.transport = transport
         self.counts = LinkCounts()
         self._mavlink = mav.MAVLink(None, srcSystem=system, srcComponent=component)
         self._parser = PacketParser(self.counts)
+        self._reader = mav.MAVLink(None)
         self._log = log
         self._clock = clock or SystemClock()
+        self._ignored = ignored
         self._sequence: dict[tuple[int, int], int] = {}
 
     def send(self, *messages: Message) -> None:
@@ -133,6 +137,11 @@ class Connection:
         self.counts.sent += len(messages)
         self.transport.send(chunk)
 
+    def relay(self, message: Message) -> Message:
+        """Send a message that we take in ourselves, too; gives it as the other end reads it: rounded, with our ids."""
+        self.send(message)
+        return self._reader.decode(bytearray(message.get_msgbuf()))
+
     def receive(self, timeout_s: float = 0.0) -> list[Message]:
         """Messages that have arrived, oldest first; waits up to ``timeout_s`` for the first."""
         if timeout_s > 0.0:
@@ -140,6 +149,9 @@ class Connection:
         messages = [message for chunk in self.transport.receive() for message in self._parser.feed(chunk)]
         for message in messages:
             self._count_lost(message)
+        if self._ignored:
+            messages = [message for message in messages if message.get_msgId() not in self._ignored]
+        for message in messages:
             if self._log is not None:
                 self._log.write(self._clock.wall_us(), message.get_msgbuf())
         return messages

@@ -25,6 +25,16 @@ class Selectable(Protocol):
         """File descriptor."""
 
 
+class Waitable(Protocol):
+    """Anything that ``wait_readable`` takes."""
+
+    def files(self) -> Sequence[Selectable]:
+        """What to select on; empty = must be polled through ``ready``."""
+
+    def ready(self) -> bool:
+        """True when there may be something that ``select`` cannot see."""
+
+
 class Transport(Protocol):
     """Bytes to and from one or several partners."""
 
@@ -48,7 +58,7 @@ class Transport(Protocol):
         """Free the port; may be called twice."""
 
 
-def wait_readable(transports: Sequence[Transport], timeout_s: float, clock: Clock | None = None) -> bool:
+def wait_readable(transports: Sequence[Waitable], timeout_s: float, clock: Clock | None = None) -> bool:
     """Wait until one of the transports may have data, at most ``timeout_s``. Returns whether one has."""
     clock = clock or SystemClock()
     deadline_s = clock.now_s() + timeout_s

@@ -10,6 +10,7 @@ from companion.guidance.follower import FollowerParams
 from companion.guidance.landing import LandingParams
 from companion.guidance.limits import LimitsParams
 from companion.guidance.line import LineParams
+from companion.link.lidar_params import LidarParams
 from companion.link.params import LinkParams
 from companion.perception.movers import MoverParams
 from companion.perception.perceive import PerceptionParams
@@ -43,6 +44,7 @@ class Params:
 
     vehicle: VehicleParams = field(default_factory=VehicleParams)
     link: LinkParams = field(default_factory=LinkParams)
+    lidar: LidarParams = field(default_factory=LidarParams)
     perception: PerceptionParams = field(default_factory=PerceptionParams)
     map: MapParams = field(default_factory=MapParams)
     movers: MoverParams = field(default_factory=MoverParams)

@@ -36,6 +36,7 @@ class PretendVehicle:
     texts: list[str] = field(default_factory=list)
     heartbeats: list[Any] = field(default_factory=list)
     mode_requests: list[int] = field(default_factory=list)
+    scans_heard: list[Any] = field(default_factory=list)
     ground_s: float = 0.0
     vel_ned_m_s: Any = field(default_factory=lambda: np.zeros(3))
 
@@ -64,6 +65,8 @@ class PretendVehicle:
                 self.texts.append(message.text)
             elif kind == mav.MAVLINK_MSG_ID_HEARTBEAT:
                 self.heartbeats.append(message)
+            elif kind == mav.MAVLINK_MSG_ID_OBSTACLE_DISTANCE:
+                self.scans_heard.append(message)
             elif kind == mav.MAVLINK_MSG_ID_COMMAND_LONG:
                 self.obey(message)
 

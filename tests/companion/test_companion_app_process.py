@@ -158,6 +158,8 @@ def one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["--goal", "50", "0", "--cruise", "99"], "cruise = 99.0 m/s is outside"),
         (["--goal", "50", "0", "--vehicle", "udpim://:1"], "did you mean 'udpin'"),
         (["--goal", "50", "0", "--lidar", "14540"], "'14540' is no connection URL"),
+        (["--goal", "50", "0", "--lidar", "lds2d:LD19"], "'lds2d:LD19': expected lds2d:MODEL:/dev/DEVICE[:BAUD]"),
+        (["--goal", "50", "0", "--lidar", "replay:no-such.jsonl"], "no-such.jsonl cannot be read: No such file"),
         (["--goal", "50", "0", "--engage", "now"], "argument --engage"),
         (["--goal", "50", "0", "--connect-timeout", "-1"], "connect_timeout_s = -1.0 must be a positive number"),
         (["--goal", "50", "0", "--params", "no-such.yaml"], "no-such.yaml cannot be read: No such file or directory"),
