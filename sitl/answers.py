@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import common as mav
 
 CRITICAL: Final = mav.MAV_SEVERITY_CRITICAL
 INFO: Final = mav.MAV_SEVERITY_INFO
+EMERGENCY: Final = mav.MAV_SEVERITY_EMERGENCY
 
 
 class Result(IntEnum):

@@ -2,7 +2,7 @@
 
 Feed ``update`` with the vehicle's state at every control tick, call a ``command_*`` when one arrives, and read
 ``armed``, ``mode``, ``landed_state`` and ``demand``. What PX4 would say as STATUSTEXT gathers in ``texts``.
-Local ned: the origin is home, where the vehicle booted.
+Local ned: the origin is where the vehicle booted.
 """
 
 import math
@@ -11,10 +11,16 @@ from typing import Final
 from companion.core.types import LandedState, VehicleState
 from sitl.answers import ACCEPTED, CRITICAL, INFO, CommandResult, Result, StatusText
 from sitl.demand import IDLE, Demand, OffboardSetpoint
-from sitl.failsafe import Failsafe, offboard_loss
+from sitl.failsafe import FAILSAFES, Facts, Failsafe
+from sitl.geo import Origin
+from sitl.guardian import Guardian
 from sitl.home import Home, here
 from sitl.land_detector import LandDetector
+from sitl.mission_flight import Ending, MissionFlight
+from sitl.mission_items import MissionType
+from sitl.mission_store import MissionStore
 from sitl.modes import ARMABLE, AUTONOMOUS, FLYABLE, MANUAL, TITLES, FlightMode
+from sitl.offboard_stream import OffboardStream
 from sitl.pilot import Sticks
 from sitl.px4_params import ParamStore
 from sitl.steering import BEHAVIOURS, Behaviour, Steering
@@ -43,8 +49,12 @@ class Autopilot:
         self._ready_said = False
         self._armed_s = math.inf
         self._landed_s = math.inf  # since when armed and landed
-        self._heard_s = -math.inf  # when the last setpoint of any kind arrived
-        self._setpoint: OffboardSetpoint | None = None
+        self._stream = OffboardStream(self.params)
+        self._mode_chosen = False  # by a person, since the last update
+        self.plans = MissionStore(self._plan_changed)
+        self.mission = MissionFlight(self.plans, self.params, lambda: self.steering.home, self.texts.append)
+        self.guardian = Guardian(self.plans, self.params, lambda: self.steering.home, self.texts.append)
+        self.steering.mission, self.steering.say = self.mission, self.texts.append
 
     # --- what others see --------------------------------------------------------------------------------------
 
@@ -85,20 +95,19 @@ class Autopilot:
             return LandedState.ON_GROUND
         if self.mode is FlightMode.TAKEOFF:
             return LandedState.TAKEOFF
-        coming_down = self.mode is FlightMode.RTL and self.steering.landing
+        returns = self.mode is FlightMode.RTL and self.steering.landing
+        coming_down = returns or (self.mode is FlightMode.MISSION and self.mission.landing)
         return LandedState.LANDING if self.mode is FlightMode.LAND or coming_down else LandedState.IN_AIR
 
     def offboard_available(self, t_s: float) -> bool:
         """Is the setpoint stream fresh enough for OFFBOARD at ``t_s``?"""
-        return t_s - self._heard_s <= self.params["COM_OF_LOSS_T"]
+        return self._stream.fresh(t_s)
 
     # --- what arrives -----------------------------------------------------------------------------------------
 
     def hear_setpoint(self, t_s: float) -> None:
         """A setpoint arrived: proof of life of the OFFBOARD stream, in any mode."""
-        if t_s - self._heard_s > self.params["COM_OF_LOSS_T"]:
-            self._setpoint = None  # of an older stream
-        self._heard_s = max(self._heard_s, t_s)
+        self._stream.hear(t_s)
 
     def hear_sticks(self, sticks: Sticks) -> None:
         """MANUAL_CONTROL arrived."""
@@ -106,7 +115,7 @@ class Autopilot:
         pilot.hear(self.t_s, sticks)
         if self.armed and self.mode in AUTONOMOUS and pilot.takes_over(self.t_s):
             self._say(INFO, "Pilot took over using sticks")
-            self._change_mode(FlightMode.POSCTL)
+            self._choose_mode(FlightMode.POSCTL)
 
     def set_home(self, home: Home) -> None:
         """From now on this is home."""
@@ -114,7 +123,7 @@ class Autopilot:
 
     def use_setpoint(self, setpoint: OffboardSetpoint) -> None:
         """From now on this is what OFFBOARD flies."""
-        self._setpoint = setpoint
+        self._stream.setpoint = setpoint
         if self._state is not None and self._steers() and self.mode is FlightMode.OFFBOARD:
             self.demand = self.steering.demand(Behaviour.OFFBOARD, self._state, setpoint)
 
@@ -149,7 +158,7 @@ class Autopilot:
         stuck = self.user_mode is FlightMode.TERMINATION and mode is not self.user_mode
         if self.armed and (stuck or not self._flyable(mode)):
             return self._refuse(f"Switching to {TITLES[mode]} is currently not available")
-        self._change_mode(mode)
+        self._choose_mode(mode)
         return ACCEPTED
 
     def command_takeoff(self, down_m: float | None = None) -> CommandResult:
@@ -161,14 +170,14 @@ class Autopilot:
             down_m = here_m - height_m
         elif down_m > here_m:
             self._say(CRITICAL, "Already higher than takeoff altitude")
-        self._change_mode(FlightMode.TAKEOFF)
+        self._choose_mode(FlightMode.TAKEOFF)
         self.steering.restart()
         self.steering.takeoff_down_m = down_m
         return ACCEPTED
 
     def command_land(self) -> CommandResult:
         """MAV_CMD_NAV_LAND: here."""
-        self._change_mode(FlightMode.LAND)
+        self._choose_mode(FlightMode.LAND)
         return ACCEPTED
 
     # --- time passes ------------------------------------------------------------------------------------------
@@ -183,16 +192,17 @@ class Autopilot:
                 self.set_home(here(state))
             self._say(INFO, "Ready for takeoff!")
         self._detect_ground(state, contact)
+        self._guard(state)
         if not self.armed:
             self.demand = IDLE
             return
-        self._watch_stream()
         self._watch_sticks()
+        self._fly_mission(state)
         self._watch_disarm()
         if not self._steers():
             self.demand = IDLE
             return
-        self.demand = self.steering.demand(self._behaviour(), state, self._setpoint)
+        self.demand = self.steering.demand(self._behaviour(), state, self._stream.setpoint)
         if self.mode is FlightMode.TAKEOFF and self.steering.arrived(state):
             self.user_mode = FlightMode.HOLD
             self.steering.settle()
@@ -208,18 +218,50 @@ class Autopilot:
             self.has_flown = True
             self._say(INFO, "Takeoff detected")
 
-    def _watch_stream(self) -> None:
-        """Enter or leave the failsafe; the intended mode comes back by itself when the stream resumes."""
-        lost = self.user_mode is FlightMode.OFFBOARD and not self.offboard_available(self.t_s)
-        if lost and self.failsafe is None:
-            self.failsafe = offboard_loss(int(self.params["COM_OBL_RC_ACT"]))
-            self.steering.restart()
-            self._say(CRITICAL, "Failsafe activated")
-            if self.failsafe.behaviour is Behaviour.CUT:
-                self._disarm("Disarmed by failsafe")
-        elif not lost and self.failsafe is not None:
-            self.failsafe = None
-            self.steering.restart()
+    def _guard(self, state: VehicleState) -> None:
+        """Enter or leave a failsafe; the intended mode comes back by itself when nothing is wrong any more."""
+        lost = self.user_mode is FlightMode.OFFBOARD and not self._stream.fresh(self.t_s)
+        blind = self.user_mode in MANUAL - {FlightMode.POSCTL, FlightMode.POSITION_SLOW}
+        by_stream = self.user_mode is FlightMode.OFFBOARD and not self._stream.needs_position
+        chosen, self._mode_chosen = self._mode_chosen, False
+        armed_for_s = self.t_s - self._armed_s
+        facts = Facts(self.t_s, self.armed, self.user_mode, armed_for_s, chosen, lost, not (blind or by_stream))
+        failsafe = FAILSAFES.get(self.guardian.judge(state, facts))
+        if failsafe is not None and failsafe.mode in MANUAL and self.steering.pilot.present(self.t_s):
+            failsafe = Failsafe(failsafe.mode, BEHAVIOURS[failsafe.mode])
+        if failsafe == self.failsafe or not self.armed:
+            return
+        self.failsafe = failsafe
+        self.steering.restart()
+        if failsafe is not None and failsafe.behaviour is Behaviour.CUT:
+            self._disarm("Disarmed by failsafe")
+
+    def _fly_mission(self, state: VehicleState) -> None:
+        mission = self.mission
+        if self._behaviour() is not Behaviour.MISSION:
+            if mission.active:
+                mission.stop()
+            return
+        if not mission.active:
+            mission.start(self._flyable(FlightMode.MISSION), self.landed)
+        mission.update(state, self.landed)
+        if mission.ending is Ending.RETURN:
+            self._change_mode(FlightMode.RTL)
+        elif mission.ending is Ending.HOLD:
+            self._change_mode(FlightMode.HOLD)
+            self.steering.adopt(mission.settle())
+
+    def _plan_changed(self, kind: MissionType) -> None:
+        """A new mission, fence or list of rally points has come."""
+        if kind is not MissionType.MISSION:
+            in_air = self._state.pos_ned_m if self._state is not None and not self.landed else None
+            self.guardian.load(kind, in_air, Origin())
+            self.steering.safe_points_ned_m = self.guardian.safe_points_ned_m
+            return
+        self.mission.load()
+        why = self.mission.objection(self.landed, self.guardian.fence)
+        if why is not None:
+            self._say(CRITICAL, why)
 
     def _watch_sticks(self) -> None:
         if self.mode not in MANUAL or self.user_mode not in MANUAL or self.steering.pilot.present(self.t_s):
@@ -247,7 +289,7 @@ class Autopilot:
     def _wants_up(self) -> bool:
         if not self.armed or self._state is None:
             return False
-        return self.steering.climbs(self._behaviour(), self._state, self._setpoint)
+        return self.steering.climbs(self._behaviour(), self._state, self._stream.setpoint)
 
     def _behaviour(self) -> Behaviour:
         return self.failsafe.behaviour if self.failsafe is not None else BEHAVIOURS.get(self.user_mode, Behaviour.HOLD)
@@ -255,7 +297,14 @@ class Autopilot:
     def _flyable(self, mode: FlightMode) -> bool:
         if mode in MANUAL:
             return self.steering.pilot.present(self.t_s)
+        if mode is FlightMode.MISSION:
+            return bool(self.plans.mission) and self.mission.objection(self.landed, self.guardian.fence) is None
         return mode in FLYABLE and (mode is not FlightMode.OFFBOARD or self.offboard_available(self.t_s))
+
+    def _choose_mode(self, mode: FlightMode) -> None:
+        """A person wants this mode."""
+        self._mode_chosen = True
+        self._change_mode(mode)
 
     def _change_mode(self, mode: FlightMode) -> None:
         if mode is self.user_mode and self.failsafe is None:
@@ -265,8 +314,6 @@ class Autopilot:
         self.steering.restart()
         if mode is FlightMode.LAND and self.armed:
             self._say(INFO, "Landing at current position")
-        elif mode is FlightMode.RTL and self.armed:
-            self._say(INFO, "RTL: start return")
         elif mode is FlightMode.TERMINATION and self.armed:
             self._say(CRITICAL, "Flight termination active")
 

@@ -115,6 +115,24 @@ class Land:
         return False
 
 
+@dataclass(frozen=True, slots=True)
+class Descend:
+    """Come down level, without knowing where."""
+
+    yaw_rad: float
+    params: ParamStore
+
+    def demand(self, state: VehicleState) -> Demand:
+        """No tilt, and the speed of a landing."""
+        speed_m_s = float(self.params["MPC_LAND_SPEED"])
+        nowhere, level = np.full(3, math.nan), np.array([0.0, 0.0, math.nan])
+        return position_demand(nowhere, self.yaw_rad, np.array([math.nan, math.nan, speed_m_s]), level)
+
+    def done(self, state: VehicleState) -> bool:
+        """Never: it ends with the land detector."""
+        return False
+
+
 def trapezoid(t_s: float, length_m: float, speed_m_s: float, acc_m_s2: float) -> tuple[float, float]:
     """Distance and speed after ``t_s`` of a way from rest to rest."""
     peak_m_s = min(speed_m_s, math.sqrt(length_m * acc_m_s2))

@@ -145,15 +145,12 @@ def from_message(message: Message) -> MissionItem:
 
 def verdict(item: MissionItem, kind: MissionType) -> int:
     """MAV_MISSION_RESULT of one uploaded item, as PX4 judges it."""
-    if item.frame in ABSOLUTE or item.frame in RELATIVE:
-        allowed, roi = _WITH_PLACE, _ROI_WITH_PLACE
-    elif item.frame == mav.MAV_FRAME_MISSION:
-        allowed, roi = _WITHOUT_PLACE, _ROI_WITHOUT
-    else:
+    placed = item.frame in ABSOLUTE or item.frame in RELATIVE
+    if not placed and item.frame != mav.MAV_FRAME_MISSION:
         return int(mav.MAV_MISSION_UNSUPPORTED_FRAME)
-    if item.command not in allowed:
+    if item.command not in (_WITH_PLACE if placed else _WITHOUT_PLACE):
         return int(mav.MAV_MISSION_UNSUPPORTED)
-    if item.command in _ROI and item.params[0] not in roi:
+    if item.command in _ROI and item.params[0] not in (_ROI_WITH_PLACE if placed else _ROI_WITHOUT):
         return int(mav.MAV_MISSION_INVALID_PARAM1)
     if kind is MissionType.MISSION and item.command in NOT_IN_MISSION:
         return int(mav.MAV_MISSION_ERROR)

@@ -4,6 +4,7 @@ Local ned; the origin is home.
 """
 
 import math
+from collections.abc import Callable
 from enum import Enum
 from typing import Final
 
@@ -12,6 +13,7 @@ import numpy as np
 from companion.core.frames import yaw_rad
 from companion.core.types import F64, VehicleState
 from sitl import flight_tasks
+from sitl.answers import INFO, StatusText
 from sitl.demand import (
     IDLE,
     AttitudeSetpoint,
@@ -23,9 +25,11 @@ from sitl.demand import (
     rates_demand,
 )
 from sitl.flight_tasks import FlightTask, GoTo, Land
+from sitl.geo import Origin
 from sitl.guided_tasks import Circle, FlyTo, Follow, Goal, Orbit, Target
 from sitl.home import Home
 from sitl.manual_tasks import CLIMBS, Acro, Assisted, Stabilized
+from sitl.mission_flight import MissionFlight
 from sitl.modes import FlightMode
 from sitl.pilot import Pilot
 from sitl.px4_params import ParamStore
@@ -47,6 +51,8 @@ class Behaviour(Enum):
     ALTITUDE = "altitude"
     STABILIZED = "stabilized"
     ACRO = "acro"
+    MISSION = "mission"
+    DESCEND = "descend"  # level, where the wind takes it
     CUT = "cut"  # motors off
 
 
@@ -58,6 +64,7 @@ BEHAVIOURS: Final = {
     FlightMode.OFFBOARD: Behaviour.OFFBOARD,
     FlightMode.ORBIT: Behaviour.ORBIT,
     FlightMode.FOLLOW: Behaviour.FOLLOW,
+    FlightMode.MISSION: Behaviour.MISSION,
     FlightMode.POSCTL: Behaviour.POSITION,
     FlightMode.POSITION_SLOW: Behaviour.POSITION,
     FlightMode.ALTCTL: Behaviour.ALTITUDE,
@@ -80,6 +87,9 @@ class Steering:
         self.circle: Circle | None = None  # of Orbit
         self.target: Target | None = None  # of Follow Target
         self.cruise_m_s: float | None = None  # DO_CHANGE_SPEED; None: MPC_XY_CRUISE
+        self.mission: MissionFlight | None = None
+        self.safe_points_ned_m: tuple[F64, ...] = ()  # rally points: Return leads to the nearest of them and home
+        self.say: Callable[[StatusText], None] = lambda _text: None
         self._params = params
         self._task: FlightTask | None = None
         self._legs: tuple[F64, ...] = ()  # of Return, still to fly
@@ -126,7 +136,13 @@ class Steering:
             place = self.goal.pos_ned_m
         if place is not None:
             return bool(place[2] < state.pos_ned_m[2] - CLIMB_MARGIN_M)
+        if behaviour is Behaviour.MISSION and self.mission is not None:
+            return self.mission.climbs
         return behaviour is Behaviour.TAKEOFF
+
+    def adopt(self, task: FlightTask | None) -> None:
+        """Go on with this task, if there is one."""
+        self._task = task
 
     def arrived(self, state: VehicleState) -> bool:
         """Has the climb of a take-off reached its height?"""
@@ -141,6 +157,8 @@ class Steering:
         """What to ask of the control loops now; idling on the ground is the caller's decision."""
         if behaviour is Behaviour.OFFBOARD and setpoint is not None:
             return self._follow(setpoint, state)
+        if behaviour is Behaviour.MISSION and self.mission is not None:
+            return self.mission.demand(state)
         if self._task is None:
             self._task = self._begin(behaviour, state)
         if self._legs and self._task.done(state):
@@ -155,8 +173,9 @@ class Steering:
         if behaviour is Behaviour.LAND:
             return flight_tasks.land(state, params, self.home.down_m)
         if behaviour is Behaviour.RETURN:
-            self._legs = flight_tasks.return_legs(state, params, self.home.pos_ned_m)
-            return flight_tasks.leg(state, self._legs[0], params)
+            return self._return(state)
+        if behaviour is Behaviour.DESCEND:
+            return flight_tasks.Descend(yaw_rad(state.q_ned_frd), params)
         if behaviour is Behaviour.ORBIT and self.circle is not None:
             return Orbit(state, self.circle, params)
         if behaviour is Behaviour.FOLLOW:
@@ -173,9 +192,20 @@ class Steering:
             return Acro(hands, params)
         return Assisted(state, hands, params, self.home.down_m, level_hold=behaviour is Behaviour.POSITION)
 
+    def _return(self, state: VehicleState) -> FlightTask:
+        places = (self.home.pos_ned_m, *self.safe_points_ned_m)
+        to = min(places, key=lambda place: float(np.hypot(*(place - state.pos_ned_m)[:2])))
+        self._legs = flight_tasks.return_legs(state, self._params, to)
+        down_m = float(self._legs[0][2])
+        height_m, amsl_m = float(to[2]) - down_m, Origin().alt_m(down_m)
+        text = f"RTL: start return at {amsl_m:.0f} m ({height_m:.0f} m above destination)"
+        self.say(StatusText(INFO, text))
+        return flight_tasks.leg(state, self._legs[0], self._params)
+
     def _next_leg(self, state: VehicleState) -> FlightTask:
         self._legs = self._legs[1:]
         if not self._legs:
+            self.say(StatusText(INFO, "RTL: land at destination"))
             return flight_tasks.land(state, self._params, self.home.down_m)
         return flight_tasks.leg(state, self._legs[0], self._params)
 
