@@ -113,12 +113,14 @@ def _prefix(engaged: Engagement, state: VehicleState, params: Params) -> F64:
 def _escape(pos_ne_m: F64, goal_ne_m: F64, percept: Percept, params: Params) -> F64:
     """(1, 2) end of a short segment into the direction that is free the farthest, goalwards among equals."""
     goal_course = math.atan2(goal_ne_m[1] - pos_ne_m[1], goal_ne_m[0] - pos_ne_m[0])
+    radius_m = params.vehicle.radius_m + params.expert.tight_m
+    near_ne_m = geometry.points_near(pos_ne_m[None], percept.points_ne_m, ESCAPE_M + radius_m)
     best, best_free = pos_ne_m, -1.0
     for way in range(ESCAPE_WAYS):
         turn = math.tau * ((way + 1) // 2) / ESCAPE_WAYS * (1 if way % 2 else -1)
         direction = np.array([math.cos(goal_course + turn), math.sin(goal_course + turn)])
         ray = np.stack([pos_ne_m, pos_ne_m + ESCAPE_M * direction])
-        free = geometry.swept_free_length(ray, percept.points_ne_m, params.vehicle.radius_m + params.expert.tight_m)
+        free = geometry.swept_free_length(ray, near_ne_m, radius_m)
         if free > best_free + 0.05:
             best, best_free = pos_ne_m + free * direction, free
     return best[None]

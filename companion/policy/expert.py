@@ -7,6 +7,7 @@ minimum seen from far away closes gaps that are open.
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from companion.core.geometry import resample
 from companion.core.gridmap import NEVER, GridMap, MapParams, cells_of, centres, occupied
 from companion.core.params import param
 from companion.core.types import F64
-from companion.policy.grid_path import BLOCKED, clearance_field, reach_from, walk_back
+from companion.policy.grid_path import BLOCKED, LIMIT, clearance_field, reach_from, walk_back
 from companion.policy.interface import WAYPOINTS, Proposal, Query
 
 
@@ -39,6 +40,9 @@ class ExpertParams:
 BORDER_CELLS = 2  # paths to a goal outside the map end in this rim
 SHORTEST_USEFUL_M = 3.0  # five waypoints should reach at least this far, else the chords are relaxed
 CHORD_RELAX = (1.0, 2.0, 4.0)
+CHORD_POINTS = 20  # of the path that one chord replaces, at most
+DETOUR_CELLS = 60.0  # a way that costs so much more than the straight one is looked for only if there is no cheaper
+UNREACHED = 4.0  # cost a cell from where a way ends to a goal on the map: that is approached as near as possible
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,42 +108,61 @@ def _field(query: Query, clearance_m: F64, hard_m: float, params: ExpertParams) 
 
 
 def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) -> F64 | None:
-    """The path to fly on, (k, 2) from the anchor; the old one unless the new one is clearly cheaper."""
+    """The path to fly on, (k, 2) from the anchor; the old one unless a new one is clearly cheaper."""
     grid = query.grid
-    n = field.cost.shape[0]
     source = _cell(grid, query.prefix_ne_m[-1])
     if field.cost.ravel()[source] >= BLOCKED:
         source = _nearest_open(grid, field, query.prefix_ne_m[-1])
-    reach = reach_from(field.cost, source)
-    target, total = _target(query, field, reach.cost, n)
-    if target is None:
-        return None
+    ahead = _straight_cells(query)
     kept = _kept(query, field, old)
-    if kept is not None and _path_cost(kept, query, field) <= params.keep_ratio * total * grid.cell_m:
-        return kept
-    cells = np.array(walk_back(reach, target))
-    north, east = centres(grid)
-    path = np.stack([north[cells // n], east[cells % n]], axis=1)
-    path[0] = query.prefix_ne_m[-1]
-    if np.hypot(*(path[-1] - query.goal_ne_m)) < 1.5 * grid.cell_m:
-        path[-1] = query.goal_ne_m
-    return _smooth(path, grid, field, params.sweeps)
+    detours: tuple[float, ...] = (DETOUR_CELLS, LIMIT)
+    if kept is not None:
+        worth = _path_cost(kept, query, field) / (params.keep_ratio * grid.cell_m)
+        detours = (worth - float(ahead.ravel()[source]),)
+    for detour in detours:
+        cells = _cheapest(field.cost, source, ahead, detour) if detour > 0.0 else None
+        if cells is not None:
+            return _smooth(_places(cells, query), grid, field, params.sweeps)
+    return kept
 
 
-def _target(query: Query, field: _Field, cost: F64, n: int) -> tuple[int | None, float]:
-    """Cheapest cell to leave the map through, or the goal's own; with the cost all the way to the goal in cells."""
-    grid = query.grid
-    north, east = centres(grid)
-    to_goal = np.hypot((north - query.goal_ne_m[0])[:, None], (east - query.goal_ne_m[1])[None, :]).ravel()
-    inside = to_goal.min() < grid.cell_m
-    penalty = 4.0 if inside else 1.0  # a goal that cannot be reached yet is approached as near as possible
-    total = cost + penalty * to_goal / grid.cell_m
-    if not inside:
-        rim = np.ones((n, n), bool)
-        rim[BORDER_CELLS:-BORDER_CELLS, BORDER_CELLS:-BORDER_CELLS] = False
-        total = np.where(rim.ravel(), total, np.inf)
+def _straight_cells(query: Query) -> F64:
+    """(n, n) straight distance from each cell to the goal, in cells."""
+    north, east = centres(query.grid)
+    dn, de = north - query.goal_ne_m[0], east - query.goal_ne_m[1]
+    straight: F64 = np.sqrt((dn * dn)[:, None] + (de * de)[None, :])
+    straight /= query.grid.cell_m
+    return straight
+
+
+def _cheapest(cost: F64, source: int, ahead: F64, detour: float) -> list[int] | None:
+    """Cells of the cheapest way off the map towards the goal, or onto it; None if it takes more than ``detour``."""
+    reach = reach_from(cost, source, ahead, detour)
+    inside = ahead.min() < 1.0
+    cells = np.arange(cost.size) if inside else _rim(cost.shape[0])
+    total = reach.cost[cells] + (UNREACHED if inside else 1.0) * ahead.ravel()[cells]
     best = int(np.argmin(total))
-    return (best, float(total[best])) if math.isfinite(total[best]) else (None, math.inf)
+    if not total[best] < min(detour, LIMIT) + ahead.ravel()[source]:
+        return None
+    return walk_back(reach, int(cells[best]))
+
+
+@lru_cache(maxsize=4)
+def _rim(n: int) -> NDArray[np.intp]:
+    rim = np.ones((n, n), bool)
+    rim[BORDER_CELLS:-BORDER_CELLS, BORDER_CELLS:-BORDER_CELLS] = False
+    return np.flatnonzero(rim)
+
+
+def _places(cells: list[int], query: Query) -> F64:
+    """(k, 2) centres of the cells, from the anchor on."""
+    north, east = centres(query.grid)
+    row, column = np.divmod(cells, len(north))
+    path = np.stack([north[row], east[column]], axis=1)
+    path[0] = query.prefix_ne_m[-1]
+    if np.hypot(*(path[-1] - query.goal_ne_m)) < 1.5 * query.grid.cell_m:
+        path[-1] = query.goal_ne_m
+    return path
 
 
 def _kept(query: Query, field: _Field, old: F64 | None) -> F64 | None:
@@ -193,26 +216,27 @@ def _cut(path: F64, params: ExpertParams) -> F64:
 
 def _chords(path: F64, tolerance_m: float, length_m: float) -> F64:
     """Greedy: each chord as long as the path between its ends stays within the tolerance."""
+    places = path.tolist()
     picked: list[int] = []
     at, used = 0, 0.0
     while at < len(path) - 1 and len(picked) < WAYPOINTS and used < length_m:
         end = at + 1
-        while end + 1 < len(path) and end - at < 20 and _leave_m(path, at, end + 1) <= tolerance_m:
+        while end + 1 < len(path) and end - at < CHORD_POINTS and _leave_m(places[at : end + 2]) <= tolerance_m:
             end += 1
-        used += float(np.hypot(*(path[end] - path[at])))
+        used += math.dist(places[at], places[end])
         picked.append(end)
         at = end
     return path[picked]
 
 
-def _leave_m(path: F64, start: int, end: int) -> float:
-    """How far the path between two of its points leaves their chord."""
-    chord = path[end] - path[start]
-    length = math.hypot(chord[0], chord[1])
+def _leave_m(places: list[list[float]]) -> float:
+    """How far a stretch of path leaves the chord between its ends."""
+    (north, east), *between, (end_north, end_east) = places
+    dn, de = end_north - north, end_east - east
+    length = math.hypot(dn, de)
     if length < 1e-9:
         return math.inf
-    between = path[start + 1 : end] - path[start]
-    return float(np.abs(between[:, 0] * chord[1] - between[:, 1] * chord[0]).max() / length)
+    return max(abs((n - north) * de - (e - east) * dn) for n, e in between) / length
 
 
 def _cell(grid: GridMap, point_ne_m: F64) -> int:

@@ -1,6 +1,7 @@
-"""What is the cheapest way over the remembered map? Distance field, cost field, Dijkstra; pure; cells of a GridMap.
+"""What is the cheapest way over the remembered map? Distance field, A*; pure; cells of a GridMap.
 
-SciPy does the graph work in C; the edge list of a square grid is built once per size.
+SciPy does the graph work in C: its Dijkstra becomes A* by edges that cost less the more they lead towards the goal. The
+columns of a square grid's matrix are built once per size.
 """
 
 import math
@@ -18,13 +19,15 @@ from companion.core.types import F64
 
 BLOCKED = 1e7  # an edge into a blocked cell; beyond LIMIT, so never walked
 LIMIT = 1e5
+PULL = 0.999  # of what a step wins towards the goal is taken off its cost: less than 1, or rounding made costs negative
+STEPS = ((0, 1), (1, -1), (1, 0), (1, 1))  # half of the eight neighbours, in the order of their flat index
 
 
 @dataclass(frozen=True, slots=True)
 class Reach:
     """Cost from one cell to every other, and how to walk back."""
 
-    cost: F64  # (n * n,) inf where unreachable
+    cost: F64  # (n * n,) inf where unreachable, or not worth to be looked at
     previous: NDArray[np.int32]  # (n * n,)
 
 
@@ -33,26 +36,33 @@ def clearance_field(grid: GridMap, occupied: NDArray[np.bool_]) -> F64:
     if not occupied.any():
         return np.full(occupied.shape, np.inf)
     nearest = distance_transform_edt(~occupied, return_distances=False, return_indices=True)
-    hit = grid.hit_ne_m[nearest[0], nearest[1]]
+    cell = nearest[0] * occupied.shape[1] + nearest[1]
     north, east = centres(grid)
-    dn, de = hit[..., 0] - north[:, None], hit[..., 1] - east[None, :]
-    clearance: F64 = np.sqrt(dn * dn + de * de)
+    dn = grid.hit_ne_m[..., 0].take(cell) - north[:, None]
+    de = grid.hit_ne_m[..., 1].take(cell) - east[None, :]
+    dn *= dn
+    de *= de
+    dn += de
+    clearance: F64 = np.sqrt(dn, out=dn)
     return clearance
 
 
-def reach_from(cell_cost: F64, source: int) -> Reach:
-    """Dijkstra over the 8-connected grid; an edge costs its length in cells times the mean cost of its ends.
+def reach_from(cell_cost: F64, source: int, ahead: F64, detour: float) -> Reach:
+    """Cheapest ways over the 8-connected grid; an edge costs its length in cells times the mean cost of its ends.
 
     Args:
         cell_cost: (n, n) at least 1; BLOCKED where nothing may pass.
         source: flat index of the first cell.
+        ahead: (n, n) straight distance to the goal in cells: no way on can cost less.
+        detour: cells through which every way costs so much more than the straight one are left out.
     """
-    edges = _edges(cell_cost.shape[0])
-    cost = cell_cost.ravel()
-    half = (cost.take(edges.tail) + cost.take(edges.head)) * edges.half_length
-    graph = csr_matrix((half.take(edges.order), edges.column, edges.row_start), shape=(cost.size, cost.size))
-    distance, previous = dijkstra(graph, indices=source, return_predecessors=True, limit=LIMIT)
-    return Reach(distance, previous)
+    size, pull = cell_cost.size, PULL * ahead
+    graph = csr_matrix((_weights(cell_cost, pull), *_columns(cell_cost.shape[0])), shape=(size, size))
+    straight = float(ahead.ravel()[source])
+    limit = min(detour, LIMIT) + (1.0 - PULL) * straight
+    cost, previous = dijkstra(graph, indices=source, return_predecessors=True, limit=limit)
+    cost += PULL * straight - pull.ravel()
+    return Reach(cost, previous)
 
 
 def walk_back(reach: Reach, target: int) -> list[int]:
@@ -63,29 +73,26 @@ def walk_back(reach: Reach, target: int) -> list[int]:
     return path[::-1]
 
 
-@dataclass(frozen=True, slots=True)
-class _Edges:
-    tail: NDArray[np.intp]  # (e,) each undirected edge once
-    head: NDArray[np.intp]
-    half_length: F64
-    order: NDArray[np.intp]  # (2 e,) which edge stands at each place of the symmetric matrix
-    column: NDArray[np.int32]
-    row_start: NDArray[np.int32]
+def _weights(cost: F64, pull: F64) -> F64:
+    """Cost of each edge (n * n * 8,), cell by cell; BLOCKED where it would leave the grid."""
+    n = cost.shape[0]
+    weights = np.full((2 * len(STEPS), n, n), BLOCKED)
+    for k, (di, dj) in enumerate(STEPS):
+        here = slice(0, n - di), slice(max(0, -dj), n - max(0, dj))
+        there = slice(di, n), slice(max(0, dj), n - max(0, -dj))
+        way = (cost[here] + cost[there]) * (math.hypot(di, dj) / 2)
+        won = pull[here] - pull[there]
+        np.subtract(way, won, out=weights[(len(STEPS) + k, *here)])
+        np.add(way, won, out=weights[(len(STEPS) - 1 - k, *there)])
+    return weights.reshape(2 * len(STEPS), -1).ravel(order="F")
 
 
 @lru_cache(maxsize=4)
-def _edges(n: int) -> _Edges:
-    index = np.arange(n * n).reshape(n, n)
-    tails, heads, lengths = [], [], []
-    for di, dj, step in ((0, 1, 1.0), (1, 0, 1.0), (1, 1, math.sqrt(2)), (1, -1, math.sqrt(2))):
-        tails.append(index[: n - di, max(0, -dj) : n - max(0, dj)].ravel())
-        heads.append(index[di:, max(0, dj) : n - max(0, -dj)].ravel())
-        lengths.append(np.full(tails[-1].size, step))
-    tail, head, length = np.concatenate(tails), np.concatenate(heads), np.concatenate(lengths)
-    row, column = np.concatenate([tail, head]), np.concatenate([head, tail])
-    edge = np.tile(np.arange(tail.size), 2)
-    order = np.lexsort((column, row))
-    row_start = np.searchsorted(row[order], np.arange(n * n + 1))
-    return _Edges(
-        tail, head, length / 2, edge[order].astype(np.intp), column[order].astype(np.int32), row_start.astype(np.int32)
-    )
+def _columns(n: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Neighbour of each edge (n * n * 8,), and where the rows begin; an edge that leaves the grid leads to its cell."""
+    row, column = (index[..., None] for index in np.indices((n, n)))
+    steps = np.array([(-di, -dj) for di, dj in reversed(STEPS)] + list(STEPS))
+    to_row, to_column = row + steps[:, 0], column + steps[:, 1]
+    inside = (to_row >= 0) & (to_row < n) & (to_column >= 0) & (to_column < n)
+    neighbour = np.where(inside, to_row * n + to_column, row * n + column)
+    return neighbour.ravel().astype(np.int32), np.arange(n * n + 1, dtype=np.int32) * len(steps)
