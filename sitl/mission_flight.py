@@ -49,7 +49,7 @@ class MissionFlight:
     def __init__(
         self, store: MissionStore, params: ParamStore, home: Callable[[], Home], say: Callable[[StatusText], None]
     ) -> None:
-        self.reached: int | None = None  # the item reached last in this activation
+        self.reached: int | None = None  # the item reached last since the mission was started or loaded
         self.ending: Ending | None = None  # set when there is nothing more to do
         self._store = store
         self._params = params
@@ -100,7 +100,6 @@ class MissionFlight:
     def stop(self) -> None:
         """Another mode took over; the current item is taken up again later."""
         self.active = False
-        self.reached = None
 
     @property
     def climbs(self) -> bool:

@@ -53,8 +53,8 @@ class Transfer:
 class MissionProtocol:
     """Serves all links of one vehicle."""
 
-    def __init__(self, store: MissionStore, say: Callable[[StatusText], None]) -> None:
-        self._store = store
+    def __init__(self, store: Callable[[], MissionStore], say: Callable[[StatusText], None]) -> None:
+        self._current_store = store
         self._say = say
         self._links: dict[str, Transfer] = {}
         self._uploading: str | None = None  # the link on which an upload runs
@@ -69,6 +69,10 @@ class MissionProtocol:
             mav.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._clear,
             mav.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._set_current,
         }
+
+    @property
+    def _store(self) -> MissionStore:
+        return self._current_store()
 
     def understands(self, message_id: int) -> bool:
         """Is it a message of this protocol?"""

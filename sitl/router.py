@@ -4,7 +4,8 @@ The one place where messages change the vehicle: commands, setpoints, parameters
 ignored silently, as PX4 does.
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from pymavlink.dialects.v20 import common as mav
@@ -15,6 +16,7 @@ from sitl.answers import CRITICAL, StatusText
 from sitl.command import Command
 from sitl.commands import ANYBODY
 from sitl.link import COMPONENT, Link
+from sitl.mission_service import MissionService
 from sitl.simulation import STEP_MS, Simulation
 
 Message = Any  # a MAVLink_*_message object
@@ -29,6 +31,9 @@ class Router:
         self.companion_heard = False
         self.answered_ms = -1  # time of the newest scan that a setpoint has answered
         self._sim = sim
+        self._missions = MissionService(sim, system_id)
+        self._now_s = 0.0  # wall
+        self._gcs_heard_s = math.nan
         self._system_id = system_id
         self._now_ns = now_ns
         self._handlers: Mapping[int, Callable[[Link, Message], None]] = {
@@ -40,7 +45,6 @@ class Router:
             mav.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._param_read,
             mav.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._param_list,
             mav.MAVLINK_MSG_ID_PARAM_SET: self._param_set,
-            mav.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: self._mission_list,
             mav.MAVLINK_MSG_ID_PING: self._ping,
             mav.MAVLINK_MSG_ID_TIMESYNC: self._timesync,
         }
@@ -50,9 +54,20 @@ class Router:
         handler = self._handlers.get(message.get_msgId())
         if handler is not None:
             handler(link, message)
+        else:
+            self._missions.handle(link, message)
 
-    def _heartbeat(self, link: Link, _message: Message) -> None:
+    def tick(self, links: Sequence[Link], now_s: float) -> None:
+        """Wall time has passed: transfers go on, silence is noticed."""
+        self._now_s = now_s
+        self._missions.tick(links, now_s)
+        silent_s = now_s - self._gcs_heard_s  # NaN before the first
+        self._sim.autopilot.guardian.hear_link(silent_s > self._sim.autopilot.params["COM_DL_LOSS_T"])
+
+    def _heartbeat(self, link: Link, message: Message) -> None:
         self.companion_heard = self.companion_heard or link.companion
+        if message.type == mav.MAV_TYPE_GCS:
+            self._gcs_heard_s = self._now_s
 
     def _command_long(self, link: Link, message: Message) -> None:
         self._execute(link, message, command.from_long(message), message.target_component)
@@ -107,13 +122,6 @@ class Router:
         if self._addressed(message):
             for reply in answer(message, self._sim):
                 link.connection.send(reply)
-
-    def _mission_list(self, link: Link, message: Message) -> None:
-        if self._addressed(message):
-            count = mav.MAVLink_mission_count_message(
-                message.get_srcSystem(), message.get_srcComponent(), 0, message.mission_type
-            )
-            link.connection.send(count)
 
     def _ping(self, link: Link, message: Message) -> None:
         if message.target_system == 0 and message.target_component == 0:

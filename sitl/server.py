@@ -97,6 +97,7 @@ class Server:
         for link in self._links:
             for message in link.connection.receive():
                 self._router.handle(link, message)
+        self._router.tick(self._links, now_s)
         self._voice.tell_changes()
 
     def _stands(self) -> bool:
