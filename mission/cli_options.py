@@ -11,7 +11,7 @@ import typer
 from mission.errors import InputError
 from mission.processes import INSTANCE_MAX
 
-EXTRA_MODULES = {"sitl": ("jsbsim", "mavsdk", "numba", "matplotlib")}  # as pyproject.toml lists them
+EXTRA_MODULES = {"sitl": ("jsbsim", "mavsdk", "numba", "fcl", "matplotlib")}  # as pyproject.toml lists them
 SPEED_MIN, SPEED_MAX = 0.1, 100.0
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines.")]
