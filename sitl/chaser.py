@@ -18,6 +18,7 @@ ACC_M_S2: Final = 2.0  # assumed, as flight_tasks.RAMP_ACC_M_S2
 BRAKE_M_S2: Final = 1.6  # planned braking; the rest is margin
 APPROACH_1_S: Final = 2.0  # speed over distance near the target
 YAW_RATE_RAD_S: Final = math.radians(60.0)  # MPC_YAWRAUTO_MAX
+TILT_S: Final = 0.2  # assumed: how fast an acceleration comes and goes
 STOPPED_M: Final = 1e-3
 PAUSE_S: Final = 0.1  # when nobody asked for longer, the point has stood still
 
@@ -38,6 +39,7 @@ class Chaser:
     def __init__(self, state: VehicleState) -> None:
         self.pos_ned_m: F64 = state.pos_ned_m.copy()
         self.vel_ned_m_s: F64 = state.vel_ned_m_s.copy()
+        self.acc_ned_m_s2: F64 = np.zeros(3)  # fed forward, smoothed: a vehicle has to tilt first
         self.yaw_rad = yaw_rad(state.q_ned_frd)
         self._t_s = state.t_s
 
@@ -50,7 +52,7 @@ class Chaser:
                 turn = wrap_rad(nose_rad - self.yaw_rad)
                 limit = YAW_RATE_RAD_S * dt_s
                 self.yaw_rad = wrap_rad(self.yaw_rad + min(max(turn, -limit), limit))
-        return position_demand(self.pos_ned_m.copy(), self.yaw_rad, self.vel_ned_m_s.copy())
+        return position_demand(self.pos_ned_m, self.yaw_rad, self.vel_ned_m_s, self.acc_ned_m_s2)
 
     def _move(self, dt_s: float, target_ned_m: F64, pace: Pace) -> None:
         way = target_ned_m - self.pos_ned_m
@@ -61,7 +63,9 @@ class Chaser:
             wanted = way * (speed_m_s(way, length_m, pace) / max(length_m, STOPPED_M))
         change = wanted - self.vel_ned_m_s
         size = float(np.linalg.norm(change))
-        self.vel_ned_m_s = self.vel_ned_m_s + change * min(1.0, ACC_M_S2 * dt_s / max(size, 1e-9))
+        change = change * min(1.0, ACC_M_S2 * dt_s / max(size, 1e-9))
+        self.vel_ned_m_s = self.vel_ned_m_s + change
+        self.acc_ned_m_s2 = self.acc_ned_m_s2 + (change / dt_s - self.acc_ned_m_s2) * min(1.0, dt_s / TILT_S)
         self.pos_ned_m = self.pos_ned_m + self.vel_ned_m_s * dt_s
 
 
