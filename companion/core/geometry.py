@@ -193,10 +193,18 @@ def swept_free_length(
     if not cut.pieces:
         return 0.0
     whole = cut.pieces[-1].s_m + cut.pieces[-1].length_m
-    near = points_near(ahead, points_ned_m, radius_m)
-    if len(near) == 0:
+    brushed = _brushed(cut.table, points_near(ahead, points_ned_m, radius_m), radius_m)
+    if len(brushed) == 0:
         return whole
-    return min(whole, _first_contact(cut.table, near, required_distance(ahead[0], near, radius_m)))
+    return min(whole, _first_contact(cut.table, brushed, required_distance(ahead[0], brushed, radius_m)))
+
+
+def _brushed(table: F64, points_ned_m: F64, reach_m: float) -> F64:
+    """The points in a rectangle round one of the pieces: every point within reach_m is among them."""
+    along, lateral, lengths = _in_segments(table, points_ned_m)
+    inside = (np.abs(lateral) < reach_m) & (along > -reach_m) & (along < lengths + reach_m)
+    brushed: F64 = points_ned_m[inside.any(axis=0)]
+    return brushed
 
 
 def _first_contact(table: F64, points_ned_m: F64, required_m: F64) -> float:

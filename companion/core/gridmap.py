@@ -102,12 +102,13 @@ def occupied_points(grid: GridMap, t_s: float, params: MapParams) -> F64:
 
 
 def cells_of(grid: GridMap, points_ne_m: F64) -> tuple[I32, NDArray[np.bool_]]:
-    """Flat cell index of each point (k, 2) and whether the point lies inside the map."""
+    """Flat cell index of each point (k, 2), 0 outside the map, and whether the point lies inside."""
     n = grid.free_t.shape[0]
-    ij = np.floor(points_ne_m / grid.cell_m).astype(np.int32)
-    i, j = ij[:, 0] - grid.corner[0], ij[:, 1] - grid.corner[1]
-    inside = (i >= 0) & (i < n) & (j >= 0) & (j < n)
-    return (i * n + j).astype(np.int32), inside
+    cells = np.floor(points_ne_m / grid.cell_m).astype(np.int32)
+    cells -= np.array(grid.corner, np.int32)
+    row, column = cells.view(np.uint32).T  # what is negative becomes large
+    inside = (row < n) & (column < n)
+    return (cells[:, 0] * n + cells[:, 1]) * inside, inside
 
 
 def centres(grid: GridMap) -> tuple[F64, F64]:
@@ -120,9 +121,7 @@ def centres(grid: GridMap) -> tuple[F64, F64]:
 def seen(grid: GridMap, points_ne_m: F64) -> NDArray[np.bool_]:
     """(k,) whether each point lies in a cell that was ever certified free or hit."""
     flat, inside = cells_of(grid, points_ne_m)
-    flat = np.where(inside, flat, 0)
-    known = (grid.free_t.ravel()[flat] > NEVER) | (grid.hit_t.ravel()[flat] > NEVER)
-    return inside & known
+    return inside & ((grid.free_t.take(flat) > NEVER) | (grid.hit_t.take(flat) > NEVER))
 
 
 def _rolled(grid: GridMap, pos_ne_m: F64) -> GridMap:
@@ -198,14 +197,12 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     range_m, sector = scan.hit_m[near], scan.hit_sector[near]
     points = scan.pos_ne_m + AZIMUTH_DIR[scan.hit_bin[near]] * range_m[:, None]
     flat, inside = cells_of(grid, points)
-    flat = np.where(inside, flat, 0)
-    possible = inside & (free_t.ravel()[flat] <= np.float32(max(scan.t_s - params.certified_s, 0.0)))
-    open_arc = np.bincount(sector, possible) > 0
-    paint = inside & (possible | ~open_arc[sector])
+    possible = inside & (free_t.take(flat) <= np.float32(max(scan.t_s - params.certified_s, 0.0)))
+    whole = (np.bincount(sector, possible) == 0.0).take(sector)
+    paint = inside & (possible | whole)
     cells = flat[paint]
     hit_t.ravel()[cells] = scan.t_s
     _place(hit_ne_m, cells, points[paint])
-    whole = ~open_arc[sector]
     if not whole.any():
         return np.empty((0, 2))
     count = np.bincount(sector, whole)

@@ -18,16 +18,17 @@ def directional_weights(bearing_rad: F64) -> F64:
 
 
 WEIGHTS = directional_weights(BEARING_RAD)
+WEIGHT_SUM = float(WEIGHTS.sum())
 
 
 def membership(range_m: F64, near_m: float, far_m: float) -> F64:
     """Distance safety r(d) (eq. membership): 0 at or below near_m, 1 at or beyond far_m, 0 where unknown (nan)."""
-    return np.nan_to_num(np.clip((range_m - near_m) / (far_m - near_m), 0.0, 1.0), nan=0.0)
+    return np.fmin(np.fmax((range_m - near_m) / (far_m - near_m), 0.0), 1.0)
 
 
 def safety_score(bearing_range_m: F64, near_m: float, far_m: float) -> float:
     """Weighted mean membership, S_fuzzy (eq. s_fuzzy), over the fixed bearings (72,)."""
-    return float(membership(bearing_range_m, near_m, far_m) @ WEIGHTS / WEIGHTS.sum())
+    return float(membership(bearing_range_m, near_m, far_m) @ WEIGHTS) / WEIGHT_SUM
 
 
 def local_density(bearing_range_m: F64, radius_m: float) -> float:
