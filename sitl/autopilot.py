@@ -47,7 +47,9 @@ class Autopilot:
         self._detector = LandDetector()
         self.steering = Steering(self.params)
         self._ready_said = False
-        self._armed_s = math.inf
+        self.armed_s = math.inf  # vehicle time of the last arming
+        self.takeoff_s = math.inf
+        self.flights = 0
         self._landed_s = math.inf  # since when armed and landed
         self._stream = OffboardStream(self.params)
         self._mode_chosen = False  # by a person, since the last update
@@ -66,7 +68,7 @@ class Autopilot:
     @property
     def ready(self) -> bool:
         """Have the prearm checks passed?"""
-        return self.t_s >= READY_S
+        return self.t_s >= READY_S and self.guardian.fit
 
     @property
     def mode(self) -> FlightMode:
@@ -137,7 +139,7 @@ class Autopilot:
         self.armed = True
         if self._state is not None and self.params["COM_HOME_EN"] and not (self.home is not None and self.home.manual):
             self.set_home(here(self._state))
-        self._armed_s = self._landed_s = self.t_s
+        self.armed_s = self._landed_s = self.t_s
         self.steering.restart()
         self._say(INFO, "Armed by external command")
         return ACCEPTED
@@ -216,6 +218,8 @@ class Autopilot:
             self._say(INFO, "Landing detected")
         else:
             self.has_flown = True
+            self.takeoff_s = state.t_s
+            self.flights += 1
             self._say(INFO, "Takeoff detected")
 
     def _guard(self, state: VehicleState) -> None:
@@ -224,7 +228,7 @@ class Autopilot:
         blind = self.user_mode in MANUAL - {FlightMode.POSCTL, FlightMode.POSITION_SLOW}
         by_stream = self.user_mode is FlightMode.OFFBOARD and not self._stream.needs_position
         chosen, self._mode_chosen = self._mode_chosen, False
-        armed_for_s = self.t_s - self._armed_s
+        armed_for_s = self.t_s - self.armed_s
         facts = Facts(self.t_s, self.armed, self.user_mode, armed_for_s, chosen, lost, not (blind or by_stream))
         failsafe = FAILSAFES.get(self.guardian.judge(state, facts))
         if failsafe is not None and failsafe.mode in MANUAL and self.steering.pilot.present(self.t_s):
@@ -273,7 +277,7 @@ class Autopilot:
     def _watch_disarm(self) -> None:
         if not (self.armed and self.landed):
             return
-        flown = self._landed_s > self._armed_s
+        flown = self._landed_s > self.armed_s
         limit_s = self.params["COM_DISARM_LAND" if flown else "COM_DISARM_PRFLT"]
         if limit_s > 0.0 and not self._wants_up() and self.t_s - self._landed_s >= limit_s:
             self._disarm("Disarmed by landing" if flown else "Disarmed by auto preflight disarming")
@@ -284,7 +288,7 @@ class Autopilot:
             return False
         if not self.landed:
             return True
-        return self._wants_up() and self.t_s - self._armed_s >= self.params["COM_SPOOLUP_TIME"]
+        return self._wants_up() and self.t_s - self.armed_s >= self.params["COM_SPOOLUP_TIME"]
 
     def _wants_up(self) -> bool:
         if not self.armed or self._state is None:

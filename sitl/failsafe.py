@@ -100,6 +100,7 @@ class Facts:
     charge: Charge = Charge.FINE
     attitude_failed: bool = False
     position_ok: bool = True
+    attitude_ok: bool = True
     needs_position: bool = True  # can the user's mode not go on without it?
 
 
@@ -168,11 +169,13 @@ def responses(facts: Facts, params: ParamStore) -> Mapping[Cause, Response]:
     return {cause: response for cause, response in found.items() if response.action is not Action.NONE}
 
 
-def possible(action: Action, position_ok: bool) -> Action:
-    """The action that can be carried out: without a position PX4 comes down level, without sticks in no other way."""
-    if position_ok or not Action.POSITION <= action <= Action.LAND:
-        return action
-    return Action.DESCEND
+def possible(action: Action, facts: Facts) -> Action:
+    """The action that can be carried out: without a position PX4 comes down level, without an attitude it gives up."""
+    if not facts.attitude_ok and Action.POSITION <= action <= Action.DESCEND:
+        return Action.TERMINATE
+    if not facts.position_ok and Action.POSITION <= action <= Action.LAND:
+        return Action.DESCEND
+    return action
 
 
 def _battery(charge: Charge, setting: int) -> Action:
@@ -188,6 +191,8 @@ def _attitude(facts: Facts, params: ParamStore) -> Action:
 
 def _fallback(facts: Facts, params: ParamStore) -> Action:
     """What is flown when the chosen mode cannot go on."""
+    if not facts.attitude_ok:
+        return Action.TERMINATE
     if facts.offboard_lost:
         return _OFFBOARD_LOSS.get(int(params["COM_OBL_RC_ACT"]), Action.LAND)  # unknown: land
     if facts.needs_position and not facts.position_ok:

@@ -50,8 +50,8 @@ class FailsafeKeeper:
             action, delayed = Action.HOLD, True
         elif self._take_over(action, facts):
             fallback = found.get(Cause.FALLBACK, Response(Action.WARN)).action
-            action = max(Action.WARN, possible(fallback, facts.position_ok))
-        self.action = possible(action, facts.position_ok) if facts.armed else Action.NONE
+            action = max(Action.WARN, possible(fallback, facts))
+        self.action = possible(action, facts) if facts.armed else Action.NONE
         if self.action > before or (warned and self.action is not Action.NONE):
             self.text = self._news(delayed)
         return self.action
@@ -90,8 +90,8 @@ class FailsafeKeeper:
 
     def _take_over(self, action: Action, facts: Facts) -> bool:
         """Has a person chosen a mode against the action in force?"""
-        steers = Action.HOLD <= possible(action, facts.position_ok) <= Action.DESCEND
-        wanted = facts.mode_changed and self.action == possible(action, facts.position_ok)
+        steers = Action.HOLD <= possible(action, facts) <= Action.DESCEND
+        wanted = facts.mode_changed and self.action == possible(action, facts)
         self._taken_over = steers and self._strictest() < Takeover.NEVER and (self._taken_over or wanted)
         return self._taken_over
 

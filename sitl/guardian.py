@@ -41,6 +41,8 @@ class Guardian:
         self.safe_points_ned_m: tuple[F64, ...] = ()  # rally points
         self.remaining = 1.0  # charge, told by the battery
         self.position_ok = True  # told by the estimator
+        self.attitude_ok = True
+        self.sensors_ok = True
         self.charge = Charge.FINE
         self.breach: Breach | None = None
         self._store = store
@@ -52,6 +54,11 @@ class Guardian:
         self._gcs_lost = False
         self._tilted_since_s = math.inf
         self._attitude_failed = False
+
+    @property
+    def fit(self) -> bool:
+        """Would PX4 let the vehicle take off?"""
+        return self.position_ok and self.attitude_ok and self.sensors_ok and self.charge < Charge.CRITICAL
 
     def hear_link(self, gcs_lost: bool) -> None:
         """Is the ground station lost? Lost means: heard before, and silent for longer than COM_DL_LOSS_T."""
@@ -85,6 +92,7 @@ class Guardian:
                 charge=self.charge,
                 attitude_failed=self._attitude_failed,
                 position_ok=self.position_ok,
+                attitude_ok=self.attitude_ok,
             )
         )
         if self._keeper.text is not None:

@@ -19,10 +19,12 @@ from companion.core.types import F64, AutopilotStatus, Scan, Setpoint, VehicleSt
 from sitl.autopilot import Autopilot
 from sitl.contact import ContactWatch
 from sitl.demand import Demand, Loop, OffboardSetpoint
+from sitl.faults import FaultBook
 from sitl.lidar import Lidar, LidarParams
 from sitl.modes import FlightMode
 from sitl.px4_params import ParamStore
 from sitl.setpoints import of_companion
+from sitl.trouble import Trouble
 from sitl.truth_log import TruthRow
 from sitl.vehicle import Truth, Vehicle, Wind
 from sitl.world import World
@@ -43,6 +45,7 @@ class SimConfig:
     radius_m: float = 0.33
     lidar: LidarParams = field(default_factory=LidarParams)
     px4_params: Mapping[str, float] = field(default_factory=dict)
+    faults: tuple[str, ...] = ()  # as ``sitl.faults`` reads them
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,9 @@ class Simulation:
         for name, value in self.config.px4_params.items():
             self.set_parameter(name, value)
         self._vehicle.reset(self.config.seed, self.config.spawn_yaw_rad, self.config.wind)
+        self.trouble = Trouble(FaultBook(self.config.faults), self.config.seed, self._vehicle, self.config.wind)
         self._applied: Demand | None = None
+        self._error_count = 0  # of the errors that the applied demand allows for
         self._armed = False
         self._lidar = Lidar(world, self.config.lidar, self.config.seed)
         self._contact = ContactWatch(world, self.config.radius_m, self.spawn_ned_m, STEP_MS / 1e3, self.scan_steps)
@@ -169,17 +174,17 @@ class Simulation:
         control = self._step % CONTROL_STEPS == 0
         checked = self._step >= self._contact.due_step
         if control or checked:
-            self._sense()
+            self._sense(tick=control)
         if control:
             self.autopilot.update(self.state, self.truth.on_ground)
         if checked:
             self._look()
 
-    def _sense(self) -> None:
+    def _sense(self, tick: bool = False) -> None:
         truth = self.truth = self._vehicle.truth()
-        self.state = quantise_state(
-            VehicleState(self.t_s, truth.pos_ned_m, truth.vel_ned_m_s, truth.q_ned_frd, truth.rates_frd_rad_s)
-        )
+        if tick:
+            self.trouble.update(self.t_s, CONTROL_STEPS * STEP_MS / 1e3, truth, self.autopilot)
+        self.state = quantise_state(self.trouble.estimate(self.t_s, truth))
 
     def _look(self) -> None:
         self._contact.look(self._step, self.t_s, self.truth)
@@ -211,10 +216,10 @@ class Simulation:
         if ap.motors_on is not self._armed:
             self._armed = ap.motors_on
             self._vehicle.set_motors(self._armed)
-        demand = ap.demand
-        if demand is self._applied:
+        demand, errors = ap.demand, self.trouble.errors
+        if demand is self._applied and errors.count == self._error_count:
             return
-        self._applied = demand
+        self._applied, self._error_count = demand, errors.count
         if demand.loop is Loop.IDLE:
             self._vehicle.command_idle()
             return
@@ -224,9 +229,12 @@ class Simulation:
         if demand.rates_frd_rad_s is not None:
             self._vehicle.command_rates(demand.rates_frd_rad_s.tolist(), demand.thrust_norm)
             return
+        pos_ned_m, vel_ned_m_s = demand.pos_ned_m, demand.vel_ned_m_s
+        if errors.any:
+            pos_ned_m, vel_ned_m_s = self.trouble.shifted(pos_ned_m, vel_ned_m_s)
         self._vehicle.command_position(
-            demand.pos_ned_m.tolist(),
-            demand.vel_ned_m_s.tolist(),
+            pos_ned_m.tolist(),
+            vel_ned_m_s.tolist(),
             demand.acc_ned_m_s2.tolist(),
             demand.yaw_rad,
             demand.yaw_rate_rad_s,
