@@ -38,6 +38,13 @@ READ = (
     "forces/fbz-total-lbs",
     "rotor/thrust-lbs",
 )
+# What the control loops do, for telemetry: tilt wanted (body down axis in ned), thrust, body rates, rotor speeds.
+LOOPS = (
+    *(f"att/z-{axis}" for axis in AXES),
+    "mix/thrust",
+    *(f"rsp/{axis}" for axis in "pqr"),
+    *(f"rotor/speed-{rotor}-norm" for rotor in ROTORS),
+)
 CONTACTS = tuple(f"contact/unit[{i}]/WOW" for i in range(8))
 WRITTEN = (
     "simulation/randomseed",

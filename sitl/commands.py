@@ -9,12 +9,14 @@ from typing import Final
 
 from pymavlink.dialects.v20 import common as mav
 
-from sitl import modes
+from sitl import commands_guided, commands_system, modes
 from sitl.answers import Result
 from sitl.command import ACCEPTED, DENIED, FAILED, REJECTED, UNSUPPORTED, Answer, Command, Handler, answer, whole
 from sitl.extra_messages import PROTOCOL_VERSION_ID, protocol_version
 from sitl.link import Link
-from sitl.messages import BUILDERS, ORIGIN
+from sitl.message_table import BUILDERS
+from sitl.messages import ORIGIN
+from sitl.messages_modes import AVAILABLE_MODES_ID, PROTOCOL_VERSION_ID, available_modes
 from sitl.simulation import Simulation
 
 FORCE: Final = 21196.0  # MAV_CMD_COMPONENT_ARM_DISARM, p2: arm or disarm whatever the state
@@ -27,10 +29,11 @@ def execute(command: Command, sim: Simulation, link: Link) -> Answer:
     return handler(command, sim, link) if handler is not None else UNSUPPORTED
 
 
-def request_message(message_id: int, sim: Simulation) -> Answer:
-    """One message on request: DENIED when it is unknown or not there yet."""
-    if message_id == PROTOCOL_VERSION_ID:
-        return Answer(Result.ACCEPTED, (protocol_version(),))
+def request_message(message_id: int, sim: Simulation, index: float = math.nan) -> Answer:
+    """One message on request: DENIED when it is unknown or not there yet. ``index``: which of several, 0: all."""
+    if message_id == AVAILABLE_MODES_ID:
+        modes_asked = available_modes(whole(index) or 0)
+        return Answer(Result.ACCEPTED, tuple(modes_asked)) if modes_asked else DENIED
     builder = BUILDERS.get(message_id)
     message = builder(sim) if builder is not None else None
     return Answer(Result.ACCEPTED, (message,)) if message is not None else DENIED
@@ -68,7 +71,7 @@ def _return(_command: Command, sim: Simulation, _link: Link) -> Answer:
 
 def _request_message(command: Command, sim: Simulation, _link: Link) -> Answer:
     message_id = whole(command.params[0])
-    return request_message(message_id, sim) if message_id is not None else DENIED
+    return request_message(message_id, sim, command.params[1]) if message_id is not None else DENIED
 
 
 def _set_interval(command: Command, _sim: Simulation, link: Link) -> Answer:
@@ -99,6 +102,10 @@ def _protocol(command: Command, sim: Simulation, _link: Link) -> Answer:
     return request_message(PROTOCOL_VERSION_ID, sim)
 
 
+def _flight_information(command: Command, sim: Simulation, _link: Link) -> Answer:
+    return request_message(mav.MAVLINK_MSG_ID_FLIGHT_INFORMATION, sim)
+
+
 def _home(command: Command, sim: Simulation, _link: Link) -> Answer:
     return request_message(mav.MAVLINK_MSG_ID_HOME_POSITION, sim)
 
@@ -115,4 +122,7 @@ _HANDLERS: Final[Mapping[int, Handler]] = {
     mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _version,
     mav.MAV_CMD_REQUEST_PROTOCOL_VERSION: _protocol,
     mav.MAV_CMD_GET_HOME_POSITION: _home,
+    mav.MAV_CMD_REQUEST_FLIGHT_INFORMATION: _flight_information,
+    **commands_guided.HANDLERS,
+    **commands_system.HANDLERS,
 }

@@ -70,10 +70,8 @@ class HilSensors:
         draws = np.random.default_rng(bias).standard_normal(6)
         self._acc_bias = (draws[:3] * self._noise.acc_bias_m_s2).tolist()
         self._gyro_bias = (draws[3:] * self._noise.gyro_bias_rad_s).tolist()
-        self._field_ned_gauss = _field_ned_gauss()
-        self._slow: tuple[float, ...] = (
-            0.0,
-        ) * 7  # as HIL_SENSOR has them, from xmag on
+        self._field_ned_gauss = field_ned_gauss()
+        self._slow: tuple[float, ...] = (0.0,) * 7  # as HIL_SENSOR has them, from xmag on
 
     def read(self, step: int, truth: Truth) -> list[Message]:
         """What is measured at a physics step: HIL_GPS when due, then HIL_SENSOR, whose time is PX4's clock."""
@@ -129,7 +127,8 @@ def pressure_at(alt_m: float) -> float:
     return float(SEA_LEVEL_HPA * (1.0 - LAPSE_K_M * alt_m / SEA_LEVEL_K) ** EXPONENT)
 
 
-def _field_ned_gauss() -> F64:
+def field_ned_gauss() -> F64:
+    """The magnetic field (3,) at home, ned."""
     declination, inclination = math.radians(DECLINATION_DEG), math.radians(INCLINATION_DEG)
     level = FIELD_GAUSS * math.cos(inclination)
     return np.array((level * math.cos(declination), level * math.sin(declination), FIELD_GAUSS * math.sin(inclination)))

@@ -9,10 +9,19 @@ from pymavlink.dialects.v20 import common as mav
 from companion.core.codec import MASK_ACC, MASK_FORCE, MASK_POS, MASK_VEL, MASK_YAW, MASK_YAW_RATE
 from companion.core.frames import wrap_rad
 from companion.core.types import F64, Setpoint
-from sitl.demand import TrajectorySetpoint, no_axes
+from sitl.demand import AttitudeSetpoint, TrajectorySetpoint, no_axes
+from sitl.geo import Origin
 
 Message = Any  # a MAVLink_*_message object
 
+GLOBAL_FRAMES: Final = (
+    mav.MAV_FRAME_GLOBAL_INT,
+    mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+    mav.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
+)
+IGNORE_RATES: Final = 7  # ATTITUDE_TARGET_TYPEMASK
+IGNORE_THRUST: Final = 64
+IGNORE_ATTITUDE: Final = 128
 _ALL_ACC: Final = sum(MASK_ACC)
 
 
@@ -39,13 +48,46 @@ def local_ned(message: Message, yaw_rad: float) -> TrajectorySetpoint:
         raise SetpointError("SET_POSITION_TARGET_LOCAL_NED force not supported")
     if not (np.isfinite(pos).any() or np.isfinite(vel).any() or np.isfinite(acc).any()):
         raise SetpointError("SET_POSITION_TARGET_LOCAL_NED invalid")
-    return TrajectorySetpoint(
-        pos,
-        vel,
-        acc,
-        yaw if math.isfinite(yaw) else math.nan,
-        m.yaw_rate if not mask & MASK_YAW_RATE and math.isfinite(m.yaw_rate) else math.nan,
-    )
+    return TrajectorySetpoint(pos, vel, acc, yaw if math.isfinite(yaw) else math.nan, _nose(m)[1])
+
+
+def global_int(message: Message, origin: Origin, home_down_m: float) -> TrajectorySetpoint:
+    """The setpoint of a SET_POSITION_TARGET_GLOBAL_INT; terrain is taken to be as high as home.
+
+    Raises SetpointError with PX4's text.
+    """
+    m, mask = message, message.type_mask
+    if m.coordinate_frame not in GLOBAL_FRAMES:
+        raise SetpointError(f"SET_POSITION_TARGET_GLOBAL_INT invalid coordinate frame {m.coordinate_frame}")
+    lat_deg, lon_deg = m.lat_int / 1e7, m.lon_int / 1e7
+    on_globe = abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0
+    north_m, east_m = origin.north_east_m(lat_deg, lon_deg) if on_globe else (math.nan, math.nan)
+    above_sea = m.coordinate_frame == mav.MAV_FRAME_GLOBAL_INT
+    down_m = origin.down_m(m.alt) if above_sea else home_down_m - m.alt
+    pos = _axes((north_m, east_m, down_m), mask, MASK_POS)
+    vel = _axes((m.vx, m.vy, m.vz), mask, MASK_VEL)
+    acc = _axes((m.afx, m.afy, m.afz), mask, MASK_ACC)
+    if mask & MASK_FORCE and mask & _ALL_ACC != _ALL_ACC:
+        raise SetpointError("SET_POSITION_TARGET_GLOBAL_INT force not supported")
+    if not (np.isfinite(pos).any() or np.isfinite(vel).any() or np.isfinite(acc).any()):
+        raise SetpointError("SET_POSITION_TARGET_GLOBAL_INT invalid")
+    return TrajectorySetpoint(pos, vel, acc, *_nose(m))
+
+
+def attitude(message: Message) -> AttitudeSetpoint | None:
+    """The setpoint of a SET_ATTITUDE_TARGET; None when it is not usable."""
+    m, mask = message, message.type_mask
+    thrust = 0.0 if mask & IGNORE_THRUST else m.thrust
+    rates = np.array([m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate])
+    if not math.isfinite(thrust):
+        return None
+    if not mask & IGNORE_ATTITUDE:
+        q = np.array(m.q, dtype=np.float64)
+        size = float(np.linalg.norm(q))
+        return AttitudeSetpoint(q / size, no_axes(), thrust) if 0.0 < size < math.inf else None
+    if mask & IGNORE_RATES or not np.isfinite(rates).all():
+        return None
+    return AttitudeSetpoint(None, rates, thrust)
 
 
 def of_companion(setpoint: Setpoint) -> TrajectorySetpoint:
@@ -58,6 +100,14 @@ def of_companion(setpoint: Setpoint) -> TrajectorySetpoint:
 
 def _float32(vector: F64 | None) -> F64:
     return no_axes() if vector is None else vector.astype(np.float32).astype(np.float64)
+
+
+def _nose(message: Message) -> tuple[float, float]:
+    """Yaw and yaw rate; NaN where not given."""
+    m, mask = message, message.type_mask
+    yaw_rad = m.yaw if not mask & MASK_YAW and math.isfinite(m.yaw) else math.nan
+    rate_rad_s = m.yaw_rate if not mask & MASK_YAW_RATE and math.isfinite(m.yaw_rate) else math.nan
+    return yaw_rad, rate_rad_s
 
 
 def _axes(values: tuple[float, float, float], mask: int, bits: tuple[int, int, int]) -> F64:

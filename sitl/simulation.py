@@ -15,18 +15,20 @@ from typing import Final
 import numpy as np
 
 from companion.core.codec import from_ms, quantise_scan, quantise_state, to_ms
+from companion.core.frames import quaternion, yaw_rad
 from companion.core.types import F64, AutopilotStatus, Scan, Setpoint, VehicleState
 from sitl.autopilot import Autopilot
 from sitl.contact import ContactWatch
 from sitl.demand import Demand, Loop, OffboardSetpoint
 from sitl.faults import FaultBook
 from sitl.lidar import Lidar, LidarParams
+from sitl.mission_items import MissionType
 from sitl.modes import FlightMode
 from sitl.px4_params import ParamStore
 from sitl.setpoints import of_companion
 from sitl.trouble import Trouble
 from sitl.truth_log import TruthRow
-from sitl.vehicle import Truth, Vehicle, Wind
+from sitl.vehicle import Loops, Truth, Vehicle, Wind
 from sitl.world import World
 
 STEP_MS: Final = 4  # 250 Hz physics
@@ -70,6 +72,7 @@ class Simulation:
         self.state: VehicleState  # the estimate at the last control tick, quantised
         self.truth: Truth
         self.scan: Scan | None = None
+        self.boot_unix_us = 0  # when the vehicle booted, UNIX time; told from outside
         self._delay_steps = math.ceil((self.config.latency_s + self.config.lidar.latency_s) * 1e3 / STEP_MS - 1e-9)
         self._step = 0
         self._queue: deque[tuple[int, OffboardSetpoint]] = deque()  # step from which it is in force
@@ -82,6 +85,7 @@ class Simulation:
         self._applied: Demand | None = None
         self._error_count = 0  # of the errors that the applied demand allows for
         self._armed = False
+        self._touched = False  # before the last boot
         self._lidar = Lidar(world, self.config.lidar, self.config.seed)
         self._contact = ContactWatch(world, self.config.radius_m, self.spawn_ned_m, STEP_MS / 1e3, self.scan_steps)
         self._closed = False  # no more rows
@@ -91,7 +95,12 @@ class Simulation:
     @property
     def contact(self) -> bool:
         """Was anything ever touched?"""
-        return self._contact.contact
+        return self._touched or self._contact.contact
+
+    @property
+    def loops(self) -> Loops:
+        """What the control loops ask for."""
+        return self._vehicle.loops()
 
     @property
     def t_s(self) -> float:
@@ -150,6 +159,26 @@ class Simulation:
         self.autopilot.params.set(name, value)
         if name in self._vehicle.parameters:
             self._vehicle.set_parameter(name, value)
+
+    def reboot(self) -> None:
+        """Start anew where the vehicle stands: vehicle time 0, disarmed; parameters and plans stay."""
+        stands, plans = self.truth, self.autopilot.plans
+        self.boot_unix_us += self._step * STEP_MS * 1000
+        self._step, self._applied, self._armed, self._closed, self.scan = 0, None, False, False, None
+        self._queue.clear()
+        self._vehicle.place(
+            stands.pos_ned_m,
+            quaternion(0.0, 0.0, yaw_rad(stands.q_ned_frd)),
+            self.config.seed,
+            self.config.wind,
+        )
+        self.autopilot = Autopilot(self.autopilot.params)
+        for kind in MissionType:
+            self.autopilot.plans.replace(kind, plans.items(kind))
+        self._touched = self.contact
+        self._contact = ContactWatch(self.world, self.config.radius_m, self.spawn_ned_m, STEP_MS / 1e3, self.scan_steps)
+        self._sense()
+        self._look()
 
     def refresh(self) -> None:
         """Bring ``state`` and ``truth`` up to this instant; between control ticks they lag behind."""

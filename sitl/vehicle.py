@@ -22,6 +22,7 @@ from sitl.aircraft import (
     FULL_THRUST_N,
     IN_M,
     LB_N,
+    LOOPS,
     MASS_KG,
     READ,
     REST_HEIGHT_M,
@@ -85,6 +86,16 @@ class Truth:
     thrust_norm: float  # sum of rotor thrusts over full thrust at sea level
 
 
+@dataclass(frozen=True, slots=True)
+class Loops:
+    """What the control loops ask for right now. Telemetry only."""
+
+    z_ned: F64  # (3,) where the body's down axis should point
+    thrust_norm: float
+    rates_frd_rad_s: F64  # (3,)
+    rotors_norm: tuple[float, ...]  # speed of each rotor over its fullest; order as ``aircraft.ROTORS``
+
+
 class Vehicle:
     """The quadrotor: ``reset``, then commands and ``step`` in any order; ``truth`` reads."""
 
@@ -98,6 +109,7 @@ class Vehicle:
             for axis in AXES
         )
         self._get = tuple(node(self._fdm, name).get_double_value for name in READ)
+        self._loops = tuple(node(self._fdm, name).get_double_value for name in LOOPS)
         self._touch = tuple(node(self._fdm, name).get_double_value for name in CONTACTS)
         names = self._fdm.query_property_catalog("param/").split()
         self._param_nodes = {n.removeprefix("param/"): node(self._fdm, n) for n in names if n.startswith("param/")}
@@ -165,6 +177,11 @@ class Vehicle:
             any(touch() != 0.0 for touch in self._touch),
             thrust_lbs * LB_N / FULL_THRUST_N,
         )
+
+    def loops(self) -> Loops:
+        """Read the control loops at this instant."""
+        n, e, d, thrust, p, q, r, *rotors = (get() for get in self._loops)
+        return Loops(np.array((n, e, d)), thrust, np.array((p, q, r)), tuple(rotors))
 
     def set_motors(self, armed: bool) -> None:
         """Start (idle speed) or stop the motors."""

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import common as mav
 
 from sitl import messages
 from sitl.link import Link
-from sitl.messages import BUILDERS
+from sitl.message_table import BUILDERS
 from sitl.simulation import Simulation
 from sitl.streams import NAVIGATION
 

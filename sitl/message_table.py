@@ -1,0 +1,15 @@
+"""Which messages can the vehicle send by itself or when asked? All builders, by message id."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from sitl import messages, messages_modes, messages_sensors
+from sitl.simulation import Simulation
+
+Message = Any  # a MAVLink_*_message object
+
+BUILDERS: Final[Mapping[int, Callable[[Simulation], Message | None]]] = {
+    **messages.BUILDERS,
+    **messages_sensors.BUILDERS,
+    **messages_modes.BUILDERS,
+}
