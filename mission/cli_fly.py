@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from mission.cli_options import (
+    Faults,
     Instance,
     Json,
     Lockstep,
@@ -38,6 +39,7 @@ def fly(
     policy: Policy = None,
     param: ParamSet = None,
     params: ParamFile = None,
+    fault: Faults = None,
     instance: Instance = 0,
     operator_url: OperatorUrl = None,
     out: Out = None,
@@ -53,7 +55,7 @@ def fly(
 
     times, in_step = parse_speed(speed, lockstep)
     settings = FlySettings(times, in_step, instance, operator_url)
-    plan = plan_flight(mission, seed, parse_overrides(params, param), world, policy)
+    plan = plan_flight(mission, seed, parse_overrides(params, param), world, policy, fault or ())
     check_ports(instance)
     folder = make_folder(plan, out)
     title = f"{plan.mission.name}, seed {seed}, {plan.mission.policy}"

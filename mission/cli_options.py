@@ -22,6 +22,12 @@ Instance = Annotated[int, typer.Option("--instance", min=0, max=INSTANCE_MAX, he
 ParamSet = Annotated[
     list[str] | None, typer.Option("--param", metavar="GROUP.FIELD=VALUE", help="Override one parameter; repeatable.")
 ]
+Faults = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault", metavar="NAME[=VALUE][@START[..END]]", help="Break something, e.g. gps_off@30; repeatable."
+    ),
+]
 ParamFile = Annotated[Path | None, typer.Option("--params", metavar="FILE", help="YAML with {group: {field: value}}.")]
 
 

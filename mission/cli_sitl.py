@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mission.cli_options import Instance, Json, Lockstep, Seed, Speed, parse_speed, print_json, require_extra
+from mission.cli_options import Faults, Instance, Json, Lockstep, Seed, Speed, parse_speed, print_json, require_extra
 from mission.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ def sitl(
     yaw: Yaw = 0.0,
     wind: WindOption = (0.0, 0.0),
     turbulence: Turbulence = "none",
+    fault: Faults = None,
     instance: Instance = 0,
     out: Out = None,
     json: Json = False,
@@ -43,7 +44,9 @@ def sitl(
 
     times, in_step = parse_speed(speed, lockstep)
     place = load_world(world, start=spawn)
-    sim = SimConfig(seed, spawn, math.radians(_finite(yaw, "--yaw")), _wind(wind, turbulence))
+    sim = SimConfig(
+        seed, spawn, math.radians(_finite(yaw, "--yaw")), _wind(wind, turbulence), faults=tuple(fault or ())
+    )
     settings = FlySettings(times, in_step, instance)
     config = VehicleConfig(place.seeded(seed), sim, settings.run_config, instance, log_dir=out)
     if json:

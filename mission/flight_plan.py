@@ -5,6 +5,7 @@ Every draw comes from ``numpy.random.SeedSequence(seed)``, one child per purpose
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,6 +58,7 @@ def plan_flight(
     overrides: dict[str, dict[str, Any]] | None = None,
     world: str | None = None,
     policy: str | None = None,
+    faults: Sequence[str] = (),
 ) -> FlightPlan:
     """Check everything and draw. Raises InputError or ParamError with one line."""
     mission = load_mission(name_or_path)
@@ -64,6 +66,9 @@ def plan_flight(
         mission = checked(Mission, {**mission.model_dump(), "world": world, "forest": None}, "--world")
     if policy is not None:
         mission = checked(Mission, {**mission.model_dump(), "policy": policy}, "--policy")
+    if faults:
+        more = {"faults": (*mission.faults, *faults)}
+        mission = checked(Mission, {**mission.model_dump(), **more}, "--fault")
     return plan_mission(mission, seed, overrides)
 
 

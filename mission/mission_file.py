@@ -13,6 +13,7 @@ from companion.core.params import nearest
 from mission.errors import InputError
 from mission.plan_file import read_plan
 from mission.strict_yaml import StrictModel, checked, read_yaml
+from sitl.faults import parse
 
 Real = Annotated[float, Strict()]
 POLICIES = ("geometric",)
@@ -78,6 +79,7 @@ class Mission(StrictModel):
     )  # radius of the disc in which the seed places the vehicle
     wind: WindSpec = WindSpec()
     noise: NoiseSpec = NoiseSpec()
+    faults: tuple[str, ...] = ()  # NAME[=VALUE][@START[..END]], see sitl.faults
     policy: str = "geometric"
     success: Success
     params: dict[str, dict[str, Any]] = Field(default_factory=dict)
@@ -87,6 +89,13 @@ class Mission(StrictModel):
         if (self.world is None) == (self.forest is None):
             raise ValueError("wants either 'world' or 'forest'")
         return self
+
+    @field_validator("faults")
+    @classmethod
+    def _known_faults(cls, specs: tuple[str, ...]) -> tuple[str, ...]:
+        for spec in specs:
+            parse(spec)
+        return specs
 
     @field_validator("policy")
     @classmethod

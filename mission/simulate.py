@@ -39,6 +39,7 @@ def sim_config(plan: FlightPlan) -> SimConfig:
         wind=Wind(plan.draws.wind_ned_m_s, Turbulence[wind.turbulence.upper()]),
         radius_m=plan.params.vehicle.radius_m,
         lidar=LidarParams(sigma_m=noise.range_sigma_m, dropout=noise.dropout),
+        faults=plan.mission.faults,
     )
 
 

@@ -94,6 +94,8 @@ def _sim(data: dict[str, Any]) -> SimConfig:
     if values.get("wind") is not None:
         n, e, d = values["wind"]["mean_ned_m_s"]
         values["wind"] = Wind((n, e, d), Turbulence[values["wind"].get("turbulence", "NONE")])
+    if "faults" in values:
+        values["faults"] = tuple(values["faults"])
     if "lidar" in values:
         values["lidar"] = LidarParams(**values["lidar"])
     return SimConfig(**values)
