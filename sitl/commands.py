@@ -9,10 +9,9 @@ from typing import Final
 
 from pymavlink.dialects.v20 import common as mav
 
-from sitl import commands_guided, commands_system, modes
+from sitl import commands_guided, commands_mission, commands_system, modes
 from sitl.answers import Result
 from sitl.command import ACCEPTED, DENIED, FAILED, REJECTED, UNSUPPORTED, Answer, Command, Handler, answer, whole
-from sitl.extra_messages import PROTOCOL_VERSION_ID, protocol_version
 from sitl.link import Link
 from sitl.message_table import BUILDERS
 from sitl.messages import ORIGIN
@@ -124,5 +123,6 @@ _HANDLERS: Final[Mapping[int, Handler]] = {
     mav.MAV_CMD_GET_HOME_POSITION: _home,
     mav.MAV_CMD_REQUEST_FLIGHT_INFORMATION: _flight_information,
     **commands_guided.HANDLERS,
+    **commands_mission.HANDLERS,
     **commands_system.HANDLERS,
 }

@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import common as mav
 
 from sitl.answers import CRITICAL, INFO, StatusText
 from sitl.command import ACCEPTED, DENIED, Answer, Command, Handler, whole
+from sitl.failure_injection import inject
 from sitl.link import Link
 from sitl.simulation import Simulation
 
@@ -59,9 +60,12 @@ def _payload(_command: Command, _sim: Simulation, _link: Link) -> Answer:
     return ACCEPTED
 
 
-def _fail(_command: Command, sim: Simulation, _link: Link) -> Answer:
+def _fail(command: Command, sim: Simulation, _link: Link) -> Answer:
     """Failure injection; DENIED unless SYS_FAILURE_EN is 1."""
-    return ACCEPTED if sim.autopilot.params["SYS_FAILURE_EN"] else DENIED
+    unit, kind, instance = (whole(param) for param in command.params[:3])
+    if not sim.autopilot.params["SYS_FAILURE_EN"] or unit is None or kind is None:
+        return DENIED
+    return Answer(inject(sim.trouble.book, unit, kind, instance or 0))
 
 
 HANDLERS: Final[Mapping[int, Handler]] = {

@@ -25,7 +25,13 @@ PREARM: Final = 0x10000000  # MAV_SYS_STATUS_PREARM_CHECK
 CAPABILITIES: Final = 0xE8FF  # PX4's own
 FLIGHT_VERSION: Final = 1 << 24 | 16 << 16 | 255  # 1.16.0 release: the version whose behaviour this follows
 PX4_VENDOR: Final = 0x26AC
-ENDURANCE_S: Final = 31 * 60.0  # hover time of the Mavic 2 Pro on one charge, data sheet
+SENSOR_BITS: Final[Mapping[int, tuple[str, ...]]] = {  # MAV_SYS_STATUS_SENSOR, and the faults that clear it
+    mav.MAV_SYS_STATUS_SENSOR_3D_GYRO: ("gyro_off",),
+    mav.MAV_SYS_STATUS_SENSOR_3D_ACCEL: ("accel_off",),
+    mav.MAV_SYS_STATUS_SENSOR_3D_MAG: ("mag_off",),
+    mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: ("baro_off",),
+    mav.MAV_SYS_STATUS_SENSOR_GPS: ("gps_off", "gps_stuck"),
+}
 CELLS: Final = 4
 CELL_FULL_V: Final = 4.2
 CELL_EMPTY_V: Final = 3.5
@@ -98,7 +104,7 @@ def gps_raw_int(sim: Simulation) -> Message:
     course_rad = math.atan2(east_m_s, north_m_s) % math.tau
     return mav.MAVLink_gps_raw_int_message(
         time_usec=codec.to_us(state.t_s),
-        fix_type=mav.GPS_FIX_TYPE_3D_FIX,
+        fix_type=mav.GPS_FIX_TYPE_3D_FIX if sim.trouble.errors.gps_ok else mav.GPS_FIX_TYPE_NO_FIX,
         lat=_e7(lat_deg),
         lon=_e7(lon_deg),
         alt=round(ORIGIN.alt_m(down_m) * 1e3),
@@ -106,13 +112,13 @@ def gps_raw_int(sim: Simulation) -> Message:
         epv=110,
         vel=round(math.hypot(north_m_s, east_m_s) * 1e2),
         cog=round(math.degrees(course_rad) * 1e2) % 36000,
-        satellites_visible=16,
+        satellites_visible=16 if sim.trouble.errors.gps_ok else 0,
     )
 
 
 def sys_status(sim: Simulation) -> Message:
     """SYS_STATUS: health bits and battery."""
-    health = HEALTHY if sim.autopilot.ready else HEALTHY & ~PREARM
+    health = (HEALTHY if sim.autopilot.ready else HEALTHY & ~PREARM) & ~_unhealthy(sim)
     return mav.MAVLink_sys_status_message(
         PRESENT,
         ENABLED,
@@ -178,8 +184,8 @@ def vfr_hud(sim: Simulation) -> Message:
 
 
 def estimator_status(sim: Simulation) -> Message:
-    """ESTIMATOR_STATUS: the estimate is the truth."""
-    flags = ESTIMATOR_OK if sim.autopilot.ready else 0
+    """ESTIMATOR_STATUS: no errors are admitted, only whether there is a position."""
+    flags = ESTIMATOR_OK if sim.autopilot.ready and sim.trouble.errors.position_ok else 0
     return mav.MAVLink_estimator_status_message(codec.to_us(sim.t_s), flags, *[0.0] * 8)
 
 
@@ -225,8 +231,14 @@ BUILDERS: Final[Mapping[int, Callable[[Simulation], Message | None]]] = {
 }
 
 
+def _unhealthy(sim: Simulation) -> int:
+    """SYS_STATUS bits of the sensors that have failed, and of a breached geofence."""
+    bits = sum(bit for bit, names in SENSOR_BITS.items() if any(name in sim.trouble.active for name in names))
+    return bits | (mav.MAV_SYS_STATUS_GEOFENCE if sim.autopilot.guardian.breach is not None else 0)
+
+
 def _battery_percent(sim: Simulation) -> int:
-    return max(0, round(100 * (1.0 - sim.autopilot.armed_time_s / ENDURANCE_S)))
+    return round(100 * sim.trouble.battery.remaining)
 
 
 def _cell_v(sim: Simulation) -> float:

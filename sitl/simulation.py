@@ -172,6 +172,7 @@ class Simulation:
             self.config.seed,
             self.config.wind,
         )
+        self.trouble = Trouble(self.trouble.book, self.config.seed, self._vehicle, self.config.wind)
         self.autopilot = Autopilot(self.autopilot.params)
         for kind in MissionType:
             self.autopilot.plans.replace(kind, plans.items(kind))
