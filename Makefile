@@ -11,7 +11,7 @@ FIND_PYTHON = python=; for p in $(PYTHON) python3.11 python3.12 python3; do \
 	&& python=$$p && break; done
 DEBIAN_PACKAGES := python3 python3-venv
 
-.PHONY: help setup fly test slow check format docs bench image clean
+.PHONY: help setup fly test slow tables check format docs bench image clean
 help:
 	@echo "make fly     set up and fly trajectory 2; ARGS='trajectory1 --seed 3 --speed 1' for another flight"
 	@echo "make test    set up, check and test: everything CI runs"
@@ -20,6 +20,7 @@ help:
 	@echo "make format  put files into the house format"
 	@echo "make docs    write docs/parameters.md from the code"
 	@echo "make slow    the long flight tests"
+	@echo "make tables  flights over many seeds, judged: the results in README.md"
 	@echo "make bench   speed as ratios to bare JSBSim"
 	@echo "make image   container of the companion (needs docker)"
 	@echo "make clean   remove .venv and caches"
@@ -64,6 +65,10 @@ test: check
 
 slow: $(VENV)/.dev
 	$(BIN)/pytest -n 2 -m slow --timeout 3600
+
+tables: $(VENV)/.sitl
+	@missed=0; for table in trajectory1 trajectory2 trajectory1_movers forest100; do \
+		$(BIN)/python -m mission.tables $$table --jobs 2 || missed=1; done; exit $$missed
 
 docs: $(VENV)/.sitl
 	$(BIN)/swiftnav params docs > docs/parameters.md
