@@ -1,7 +1,8 @@
 """How far along a polyline, how far from it, and how far can a disc follow it before it touches a point?
 
 Plane geometry in (north, east) metres, pure. Polylines are (k, 2) arrays, k >= 1; repeated vertices are allowed. Few
-vertices are walked in plain floats (a tick has no time for many tiny arrays); many points are handled as arrays.
+vertices are walked in plain floats (a tick has no time for many tiny arrays); many points are handled as arrays of
+complex numbers, north + i east: one product turns them all into the frame of a piece.
 """
 
 import itertools
@@ -11,6 +12,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.core.types import F64
 
@@ -153,8 +155,8 @@ def points_to_polyline_distance(path_ned_m: F64, points_ned_m: F64) -> F64:
     if not cut.pieces:
         alone: F64 = np.hypot(points_ned_m[:, 0] - path_ned_m[0, 0], points_ned_m[:, 1] - path_ned_m[0, 1])
         return alone
-    along, lateral, lengths = _in_segments(cut.table, points_ned_m)
-    beyond = along - np.minimum(np.maximum(along, 0.0), lengths)
+    along, lateral = _in_segments(cut, points_ned_m)
+    beyond = along - np.minimum(np.maximum(along, 0.0), cut.length_m)
     distance: F64 = np.sqrt((beyond * beyond + lateral * lateral).min(axis=0))
     return distance
 
@@ -193,45 +195,49 @@ def swept_free_length(
     if not cut.pieces:
         return 0.0
     whole = cut.pieces[-1].s_m + cut.pieces[-1].length_m
-    brushed = _brushed(cut.table, points_near(ahead, points_ned_m, radius_m), radius_m)
+    near = points_near(ahead, points_ned_m, radius_m) if len(cut.pieces) > 1 else points_ned_m
+    brushed = _brushed(cut, near, radius_m)
     if len(brushed) == 0:
         return whole
-    return min(whole, _first_contact(cut.table, brushed, required_distance(ahead[0], brushed, radius_m)))
+    return min(whole, _first_contact(cut, brushed, required_distance(ahead[0], brushed, radius_m)))
 
 
-def _brushed(table: F64, points_ned_m: F64, reach_m: float) -> F64:
+def _brushed(cut: "_Cut", points_ned_m: F64, reach_m: float) -> F64:
     """The points in a rectangle round one of the pieces: every point within reach_m is among them."""
-    along, lateral, lengths = _in_segments(table, points_ned_m)
-    inside = (np.abs(lateral) < reach_m) & (along > -reach_m) & (along < lengths + reach_m)
+    along, lateral = _in_segments(cut, points_ned_m)
+    half = cut.length_m / 2.0
+    inside = (np.abs(lateral) < reach_m) & (np.abs(along - half) < half + reach_m)
     brushed: F64 = points_ned_m[inside.any(axis=0)]
     return brushed
 
 
-def _first_contact(table: F64, points_ned_m: F64, required_m: F64) -> float:
+def _first_contact(cut: "_Cut", points_ned_m: F64, required_m: F64) -> float:
     """Smallest arc length at which a point is nearer than required; inf if none ever is."""
-    along, lateral, lengths = _in_segments(table, points_ned_m)
+    along, lateral = _in_segments(cut, points_ned_m)
     chord = required_m * required_m - lateral * lateral
     half = np.sqrt(np.maximum(chord, 0.0))
-    touched = (chord > 0.0) & (along + half > 0.0) & (along - half < lengths)
+    touched = (chord > 0.0) & (along + half > 0.0) & (along - half < cut.length_m)
     if not touched.any():
         return math.inf
-    entry: F64 = table[:, 5:6] + np.maximum(along - half, 0.0)
+    entry: F64 = cut.s_m + np.maximum(along - half, 0.0)
     return float(entry[touched].min())
 
 
-def _in_segments(table: F64, points_ned_m: F64) -> tuple[F64, F64, F64]:
-    """Coordinates (m, n) of every point along and right of every piece, and the lengths (m, 1)."""
-    dn = points_ned_m[:, 0] - table[:, 0:1]
-    de = points_ned_m[:, 1] - table[:, 1:2]
-    tn, te = table[:, 2:3], table[:, 3:4]
-    return dn * tn + de * te, tn * de - te * dn, table[:, 4:5]
+def _in_segments(cut: "_Cut", points_ned_m: F64) -> tuple[F64, F64]:
+    """Coordinates (m, n) of every point along and right of every piece."""
+    points = np.ascontiguousarray(points_ned_m, np.float64).view(np.complex128)[:, 0]
+    turned = (points - cut.start) * cut.back
+    return turned.real, turned.imag
 
 
 class _Cut(NamedTuple):
-    """A polyline in pieces, and the same as an array (m, 6)."""
+    """A polyline in pieces, and the same as columns (m, 1)."""
 
     pieces: tuple[Segment, ...]
-    table: F64
+    start: NDArray[np.complex128]
+    back: NDArray[np.complex128]  # direction, conjugate: turns it to 1
+    length_m: F64
+    s_m: F64
 
 
 def _cut(path_ned_m: F64) -> _Cut:
@@ -250,4 +256,6 @@ def _cut_of(vertices: bytes) -> _Cut:
             pieces.append(Segment(north, east, dn / length, de / length, length, s))
             s += length
             north, east = next_north, next_east
-    return _Cut(tuple(pieces), np.array(pieces))
+    rows = [(complex(p.north_m, p.east_m), complex(p.dir_north, -p.dir_east), p.length_m, p.s_m) for p in pieces]
+    start, back, lengths, starts = np.array(rows).reshape(-1, 4, 1).swapaxes(0, 1)
+    return _Cut(tuple(pieces), start, back, lengths.real, starts.real)

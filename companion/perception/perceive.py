@@ -110,12 +110,13 @@ def sensitivity(density: float, params: PerceptionParams) -> float:
 
 def line_of_sight(pos_ne_m: F64, goal_ne_m: F64, points_ne_m: F64, radius_m: float, params: PerceptionParams) -> bool:
     """Is a corridor as wide as the vehicle plus margin free along the ray to the goal, or to ``sight_m``?"""
-    offset = goal_ne_m - pos_ne_m
-    distance = math.hypot(offset[0], offset[1])
+    (north, east), (goal_north, goal_east) = pos_ne_m.tolist(), goal_ne_m.tolist()
+    distance = math.hypot(goal_north - north, goal_east - east)
     if distance < 1e-6:
         return True
     reach = min(distance, params.sight_m)
-    ray = np.stack([pos_ne_m, pos_ne_m + offset * (reach / distance)])
+    share = reach / distance
+    ray = np.array([[north, east], [north + share * (goal_north - north), east + share * (goal_east - east)]])
     return swept_free_length(ray, points_ne_m, radius_m + params.sight_margin_m) >= reach - 1e-9
 
 
