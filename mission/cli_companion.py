@@ -6,7 +6,7 @@ The arguments are the companion's, and argparse reads them as it does there: a g
 import argparse
 import dataclasses
 
-from companion.app.command_line import CRUISE_M_S, config_from, launch, parser, read_params
+from companion.app.command_line import CRUISE_M_S, check_only, config_from, launch, parser, read_params
 from companion.app.command_line import InputError as CompanionInputError
 from companion.core import params
 from companion.navigator import Params
@@ -17,16 +17,18 @@ PROG = "swiftnav companion"
 
 def companion(arguments: list[str]) -> int:
     """Run the companion until it has landed or was stopped. Returns its exit code. Raises InputError or ParamError."""
-    options = parser(PROG, goal_required=False)
+    options = parser(PROG)
     options.add_argument(
         "--mission", metavar="FILE", help="goal, cruise and parameters of a mission, instead of --goal"
     )
     options.set_defaults(cruise=None)
     given = options.parse_args(arguments)
-    if (given.goal is None) == (given.mission is None):
+    if (given.goal is not None and given.mission is not None) or not (given.goal or given.mission or given.check):
         options.error("wants either --goal NORTH EAST [DOWN] or --mission FILE")
     tuned = _take_mission(given) if given.mission is not None else Params()
     given.cruise = CRUISE_M_S if given.cruise is None else given.cruise
+    if given.check:
+        return check_only(given, tuned)
     try:
         config = config_from(given)
         overrides = read_params(given.params) if given.params else {}

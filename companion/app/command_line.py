@@ -18,6 +18,9 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from companion.app.config import VEHICLE_URL, CompanionConfig, Engage
+from companion.app.preflight import check
+from companion.app.preflight.listen import LISTEN_S
+from companion.app.preflight.show import print_json, print_table
 from companion.app.run import fly
 from companion.app.status import ExitCode
 from companion.core import params
@@ -27,9 +30,11 @@ from companion.core.url import parse_url
 from companion.navigator import Params
 
 CRUISE_M_S = 3.0
+ELSEWHERE = [50.0, 0.0]  # a goal for a check that was not told one
 EXAMPLE = """\
 example:
   python -m companion --vehicle udpin://0.0.0.0:14540 --goal 55 0 -3 --cruise 4 --log flights/first
+  python -m companion --vehicle serial:///dev/serial0:921600 --lidar lds2d:LD19:/dev/ttyUSB0 --check
 """
 
 
@@ -45,7 +50,7 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(int(ExitCode.BAD_INPUT), f"{self.prog}: {message} (try --help)\n")
 
 
-def parser(prog: str = "python -m companion", goal_required: bool = True) -> argparse.ArgumentParser:
+def parser(prog: str = "python -m companion") -> OneLineParser:
     """The options."""
     options = OneLineParser(
         prog=prog,
@@ -58,7 +63,7 @@ def parser(prog: str = "python -m companion", goal_required: bool = True) -> arg
     lidar_help = "a LiDAR of its own: URL of one that speaks MAVLink, replay:FILE, or lds2d:MODEL:/dev/DEVICE"
     add("--lidar", metavar="URL", help=f"{lidar_help} (default: scans come over the vehicle's link)")
     goal_help = "NORTH EAST [DOWN] from where it booted"
-    add("--goal", metavar="M", type=_number, nargs="+", required=goal_required, help=goal_help)
+    add("--goal", metavar="M", type=_number, nargs="+", help=goal_help)
     add("--cruise", metavar="M_S", type=_number, default=CRUISE_M_S, help="cap of the speed (default: %(default)s)")
     add("--params", metavar="FILE", type=Path, help="YAML of {group: {field: value}}")
     add("--log", metavar="DIR", type=Path, help="log folder (default: flights/<UTC>_companion)")
@@ -66,6 +71,8 @@ def parser(prog: str = "python -m companion", goal_required: bool = True) -> arg
     add("--connect-timeout", metavar="S", type=_number, default=30.0, help="give up without a vehicle after this")
     add("--instance", metavar="N", type=int, default=0, help="added to the port of the default URL")
     add("--seed", metavar="N", type=int, default=0, help="kept with the flight's log")
+    add("--check", action="store_true", help="do not fly: say what is missing before the take-off, exit 6 if unfit")
+    add("--check-time", metavar="S", type=_number, default=LISTEN_S, help="how long to listen (default: %(default)s)")
     add("--json", action="store_true", help="print one JSON object at the end")
     add("--status", action="store_true", help="print a line about the flight now and then")
     return options
@@ -73,13 +80,36 @@ def parser(prog: str = "python -m companion", goal_required: bool = True) -> arg
 
 def main(arguments: list[str] | None = None, prog: str = "python -m companion") -> int:
     """Parse, fly, give the exit code."""
-    given = parser(prog).parse_args(arguments)
+    options = parser(prog)
+    given = options.parse_args(arguments)
+    if given.check:
+        return check_only(given)
+    if given.goal is None:
+        options.error("the following arguments are required: --goal")
     try:
         config = config_from(given)
     except (InputError, ParamError) as error:
         print(error, file=sys.stderr)
         return int(ExitCode.BAD_INPUT)
     return launch(config, given)
+
+
+def check_only(given: argparse.Namespace, tuned: Params | None = None) -> int:
+    """Check instead of flying; the exit code. ``tuned``: what a mission changes of the parameters."""
+    goal_given, problem, tuned = given.goal is not None, None, tuned or Params()
+    try:
+        tuned = params.update(tuned, read_params(given.params) if given.params else {})
+    except (InputError, ParamError) as error:
+        problem = str(error)
+    given.params, given.goal = None, given.goal or ELSEWHERE
+    try:
+        config = dataclasses.replace(config_from(given), params=tuned)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return int(ExitCode.BAD_INPUT)
+    report = check(config, given.check_time, problem, goal_given)
+    (print_json if given.json else print_table)(report)
+    return int(ExitCode.LANDED if report.fit else ExitCode.UNFIT)
 
 
 def launch(config: CompanionConfig, given: argparse.Namespace) -> int:

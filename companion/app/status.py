@@ -14,6 +14,7 @@ class ExitCode(IntEnum):
     NO_VEHICLE = 3
     VEHICLE_LOST = 4
     TICK_FAILED = 5
+    UNFIT = 6  # what ``--check`` found
 
 
 @dataclass(frozen=True, slots=True)
