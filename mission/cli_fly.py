@@ -7,13 +7,16 @@ import typer
 
 from mission.cli_options import (
     Faults,
+    FirmwareName,
     Instance,
     Json,
     Lockstep,
     ParamFile,
     ParamSet,
+    Px4Bin,
     Seed,
     Speed,
+    parse_firmware,
     parse_overrides,
     parse_speed,
     print_json,
@@ -42,6 +45,8 @@ def fly(
     fault: Faults = None,
     instance: Instance = 0,
     operator_url: OperatorUrl = None,
+    firmware: FirmwareName = "embedded",
+    px4_bin: Px4Bin = None,
     out: Out = None,
     json: Json = False,
 ) -> None:
@@ -50,13 +55,17 @@ def fly(
     from mission.console import FlightConsole, LogTail, print_result
     from mission.flight_folder import make_folder
     from mission.flight_plan import plan_flight
+    from mission.px4_firmware import with_gps_tolerance
     from mission.runner import FlySettings, check_ports
     from mission.runner import fly as run
 
     times, in_step = parse_speed(speed, lockstep)
-    settings = FlySettings(times, in_step, instance, operator_url)
+    who, px4 = parse_firmware(firmware, px4_bin)
+    settings = FlySettings(times, in_step, instance, operator_url, who, px4)
     plan = plan_flight(mission, seed, parse_overrides(params, param), world, policy, fault or ())
-    check_ports(instance)
+    if who.value == "px4":
+        plan = with_gps_tolerance(plan)
+    check_ports(instance, who)
     folder = make_folder(plan, out)
     title = f"{plan.mission.name}, seed {seed}, {plan.mission.policy}"
     with FlightConsole(title, LogTail(folder / "navigator.jsonl"), quiet=json) as console:

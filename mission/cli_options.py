@@ -4,12 +4,16 @@ import importlib.util
 import json
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mission.errors import InputError
 from mission.processes import INSTANCE_MAX
+
+if TYPE_CHECKING:
+    from mission.px4_firmware import Px4Build
+    from sitl.vehicle_config import Firmware
 
 EXTRA_MODULES = {"sitl": ("jsbsim", "mavsdk", "numba", "fcl", "matplotlib")}  # as pyproject.toml lists them
 SPEED_MIN, SPEED_MAX = 0.1, 100.0
@@ -29,6 +33,10 @@ Faults = Annotated[
     ),
 ]
 ParamFile = Annotated[Path | None, typer.Option("--params", metavar="FILE", help="YAML with {group: {field: value}}.")]
+FirmwareName = Annotated[str, typer.Option("--firmware", help="Who flies: embedded, or px4 (a real one).")]
+Px4Bin = Annotated[
+    Path | None, typer.Option(envvar="PX4_BIN", help="With --firmware px4: start this .../bin/px4; else wait for one.")
+]
 
 
 def require_extra(extra: str, command: str) -> None:
@@ -48,6 +56,19 @@ def parse_speed(text: str, lockstep: bool) -> tuple[float, bool]:
     if not SPEED_MIN <= speed <= SPEED_MAX:
         raise InputError(f"--speed '{text}' wants a number in [{SPEED_MIN:g}, {SPEED_MAX:g}] or 'max'")
     return speed, lockstep
+
+
+def parse_firmware(name: str, px4_bin: Path | None) -> tuple["Firmware", "Px4Build | None"]:
+    """Who flies, and the build to start. Raises InputError."""
+    from companion.core.params import nearest
+    from mission.px4_firmware import find_build
+    from sitl.vehicle_config import Firmware
+
+    names = [firmware.value for firmware in Firmware]
+    if name not in names:
+        raise InputError(f"--firmware '{name}' is unknown{nearest(name, names)}")
+    firmware = Firmware(name)
+    return firmware, find_build(px4_bin) if firmware is Firmware.PX4 and px4_bin is not None else None
 
 
 def parse_overrides(file: Path | None, settings: list[str] | None) -> dict[str, dict[str, Any]]:

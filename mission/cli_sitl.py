@@ -6,7 +6,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mission.cli_options import Faults, Instance, Json, Lockstep, Seed, Speed, parse_speed, print_json, require_extra
+from mission.cli_options import (
+    Faults,
+    FirmwareName,
+    Instance,
+    Json,
+    Lockstep,
+    Px4Bin,
+    Seed,
+    Speed,
+    parse_firmware,
+    parse_speed,
+    print_json,
+    require_extra,
+)
 from mission.errors import InputError
 
 if TYPE_CHECKING:
@@ -31,11 +44,17 @@ def sitl(
     turbulence: Turbulence = "none",
     fault: Faults = None,
     instance: Instance = 0,
+    firmware: FirmwareName = "embedded",
+    px4_bin: Px4Bin = None,
     out: Out = None,
     json: Json = False,
 ) -> int:
-    """The vehicle alone, as PX4 would be: companion udp 14540, ground station 14550. Ends with Ctrl-C."""
+    """The vehicle alone, as PX4 would be: companion udp 14540, ground station 14550. Ends with Ctrl-C.
+
+    With --firmware px4 the aircraft alone, for a real PX4 at tcp 4560; its LiDAR goes to udp 14650.
+    """
     require_extra("sitl", "sitl")
+    from mission.px4_firmware import running
     from mission.runner import FlySettings
     from mission.world_file import load_world
     from sitl.app import run
@@ -43,15 +62,17 @@ def sitl(
     from sitl.vehicle_config import VehicleConfig
 
     times, in_step = parse_speed(speed, lockstep)
+    who, px4 = parse_firmware(firmware, px4_bin)
     place = load_world(world, start=spawn)
     sim = SimConfig(
         seed, spawn, math.radians(_finite(yaw, "--yaw")), _wind(wind, turbulence), faults=tuple(fault or ())
     )
     settings = FlySettings(times, in_step, instance)
-    config = VehicleConfig(place.seeded(seed), sim, settings.run_config, instance, log_dir=out)
+    config = VehicleConfig(place.seeded(seed), sim, settings.run_config, instance, log_dir=out, firmware=who)
     if json:
         print_json(config.to_json())
-    return run(config)
+    with running(px4, instance, out):
+        return run(config)
 
 
 def _wind(towards_m_s: tuple[float, float], turbulence: str) -> "Wind":

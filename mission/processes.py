@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -59,14 +59,21 @@ class Children:
 
     def start(self, name: str, module: str, arguments: Sequence[str], log: Path) -> Child:
         """Run ``python -m module arguments`` with one thread for each numeric library."""
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        return self.start_program(name, [sys.executable, "-m", module, *arguments], log, threads)
+
+    def start_program(
+        self, name: str, arguments: Sequence[str], log: Path, environment: Mapping[str, str], cwd: Path | None = None
+    ) -> Child:
+        """Run any program with ``environment`` on top of our own."""
         with log.open("wb") as out:
             process = subprocess.Popen(
-                [sys.executable, "-m", module, *arguments],
+                list(arguments),
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=subprocess.STDOUT,
-                env=environment,
+                env={**os.environ, **environment},
+                cwd=cwd,
                 start_new_session=True,
             )
         child = Child(name, log, process)

@@ -12,18 +12,20 @@ import socket
 import threading
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from mission import operator
+from mission import operator, px4_firmware
 from mission.console import FlightConsole
 from mission.errors import FlightError, InputError
 from mission.flight_folder import write_inputs, write_result
 from mission.flight_plan import DECIMALS, FlightPlan
 from mission.judge import Result, judge
 from mission.processes import INSTANCE_MAX, Child, Children, wait_for_end
+from mission.px4_firmware import Px4Build
 from mission.simulate import sim_config
 from sitl.link import SPECS
 from sitl.server import RunConfig
-from sitl.vehicle_config import VehicleConfig
+from sitl.vehicle_config import Firmware, VehicleConfig
 
 REFRESH_WALL_S = 0.1
 AFTERWARDS_WALL_S = 5.0  # that the companion has to notice that the flight is over
@@ -39,6 +41,13 @@ class FlySettings:
     lockstep: bool = True
     instance: int = 0
     operator_url: str | None = None
+    firmware: Firmware = Firmware.EMBEDDED
+    px4: Px4Build | None = None  # with firmware PX4: started here; None: somebody else starts one
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready."""
+        px4 = str(self.px4.binary) if self.px4 is not None else None
+        return asdict(self) | {"speed": str(self.speed), "px4": px4}
 
     @property
     def run_config(self) -> RunConfig:
@@ -46,18 +55,27 @@ class FlySettings:
         return RunConfig(self.speed, self.lockstep, gates=self.lockstep or self.speed > 1.0)
 
 
-def check_ports(instance: int) -> None:
+def check_ports(instance: int, firmware: Firmware = Firmware.EMBEDDED) -> None:
     """Raise InputError naming the first port that somebody else holds."""
-    ports = {spec.local_port: f"vehicle's {spec.name} link" for spec in SPECS}
-    ports |= {spec.remote_port: spec.name for spec in SPECS if spec.name != "gcs"}
+    if firmware is Firmware.PX4:
+        _check_port(px4_firmware.tcp_port(instance), "PX4's simulator link", socket.SOCK_STREAM)
+        _check_port(px4_firmware.OPERATOR_PORT, "operator")
+        ports = px4_firmware.udp_ports() | {COMPANION_PORT: "companion"}
+    else:
+        ports = {spec.local_port: f"vehicle's {spec.name} link" for spec in SPECS}
+        ports |= {spec.remote_port: spec.name for spec in SPECS if spec.name != "gcs"}
     for port, user in ports.items():
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(("0.0.0.0", port + instance))
-            except OSError as error:
-                raise InputError(
-                    f"port {port + instance} ({user}) is in use: end the other flight or choose --instance N"
-                ) from error
+        _check_port(port + instance, user)
+
+
+def _check_port(port: int, user: str, kind: socket.SocketKind = socket.SOCK_DGRAM) -> None:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        if kind is socket.SOCK_STREAM:  # a connection that was closed a moment ago is nobody
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("0.0.0.0", port))
+        except OSError as error:
+            raise InputError(f"port {port} ({user}) is in use: end the other flight or choose --instance N") from error
 
 
 def free_instance() -> int:
@@ -72,7 +90,7 @@ def free_instance() -> int:
 
 def fly(plan: FlightPlan, settings: FlySettings, folder: Path, console: FlightConsole) -> Result:
     """Fly, judge, write everything into ``folder``. KeyboardInterrupt passes on after result.json was written."""
-    write_inputs(plan, folder, asdict(settings) | {"speed": str(settings.speed)})
+    write_inputs(plan, folder, settings.as_dict())
     trouble: str | None = None
     try:
         with Children() as children:
@@ -96,21 +114,36 @@ async def _fly(
     companion = children.start(
         "companion", "companion", companion_arguments(plan, settings, folder), folder / "companion.log"
     )
+    firmware = _start_firmware(settings, folder, children)
     vehicle = children.start("vehicle", "sitl", [str(_write_vehicle(plan, settings, folder))], folder / "vehicle.log")
-    url = settings.operator_url or f"udpin://0.0.0.0:{OPERATOR_PORT + settings.instance}"
-    config = operator.OperatorConfig(url, plan.mission.success.time_limit_s)
+    config = operator.OperatorConfig(_operator_url(settings), plan.mission.success.time_limit_s)
     flight = asyncio.create_task(operator.fly(config, console.say))
     try:
         while not flight.done():
             await asyncio.wait({flight}, timeout=REFRESH_WALL_S)
             console.refresh()
-            _check_running(companion, vehicle)
+            _check_running(companion, vehicle, *firmware)
         await flight
     finally:
         flight.cancel()
         await asyncio.gather(flight, return_exceptions=True)
     await asyncio.to_thread(wait_for_end, companion, AFTERWARDS_WALL_S)
     console.refresh()
+
+
+def _start_firmware(settings: FlySettings, folder: Path, children: Children) -> list[Child]:
+    """PX4, where it is ours to start."""
+    if settings.px4 is None:
+        return []
+    return [px4_firmware.start(children, settings.px4, settings.instance, folder / "px4", folder / "px4.log")]
+
+
+def _operator_url(settings: FlySettings) -> str:
+    if settings.operator_url is not None:
+        return settings.operator_url
+    if settings.firmware is Firmware.PX4:
+        return px4_firmware.operator_url()
+    return f"udpin://0.0.0.0:{OPERATOR_PORT + settings.instance}"
 
 
 def companion_arguments(plan: FlightPlan, settings: FlySettings, folder: Path) -> list[str]:
@@ -125,12 +158,20 @@ def companion_arguments(plan: FlightPlan, settings: FlySettings, folder: Path) -
         *("--params", str(folder / "params.yaml")),
         *("--log", str(folder)),
         *("--seed", str(plan.seed)),
+        *(("--lidar", px4_firmware.lidar_url(settings.instance)) if settings.firmware is Firmware.PX4 else ()),
     ]
 
 
 def vehicle_config(plan: FlightPlan, settings: FlySettings, folder: Path | None) -> VehicleConfig:
     """What the vehicle's process is told."""
-    return VehicleConfig(plan.world, sim_config(plan), settings.run_config, settings.instance, log_dir=folder)
+    return VehicleConfig(
+        plan.world,
+        sim_config(plan),
+        settings.run_config,
+        settings.instance,
+        log_dir=folder,
+        firmware=settings.firmware,
+    )
 
 
 def _write_vehicle(plan: FlightPlan, settings: FlySettings, folder: Path) -> Path:
@@ -139,9 +180,9 @@ def _write_vehicle(plan: FlightPlan, settings: FlySettings, folder: Path) -> Pat
     return path
 
 
-def _check_running(companion: Child, vehicle: Child) -> None:
-    """Raise FlightError when the vehicle has ended, or the companion other than by landing."""
-    for child, fine in ((vehicle, None), (companion, 0)):
+def _check_running(companion: Child, *vehicle: Child) -> None:
+    """Raise FlightError when something of the vehicle has ended, or the companion other than by landing."""
+    for child, fine in (*((child, None) for child in vehicle), (companion, 0)):
         code = child.exit_code
         if code is not None and code != fine:
             raise FlightError(f"the {child.name} ended: {f'signal {-code}' if code < 0 else child.last_line() or code}")

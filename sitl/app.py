@@ -75,7 +75,7 @@ def _open_px4(config: VehicleConfig, stack: ExitStack, say: Say) -> Bridge:
         plant = px4_app.open_plant(config)
     except ValueError as error:
         raise ConfigError(str(error)) from error
-    links = px4_app.open_links(config, plant, clock, stack, say)
+    links = px4_app.open_links(config, plant, clock, stack)
     truth = _open_truth(config, plant.spawn_ned_m, stack)
     return px4_app.open_bridge(config, plant, links, clock, truth, say)
 

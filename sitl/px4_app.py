@@ -7,13 +7,12 @@ from companion.core.clock import Clock
 from companion.core.codec import VEHICLE_COMPONENT
 from companion.core.mavlink import Connection
 from companion.core.tcp import tcp_in
-from companion.core.udp import udp_out
-from sitl import px4_ear
+from companion.core.udp import udp_in, udp_out
 from sitl.hil_sensors import HilSensors
 from sitl.link import HOST
 from sitl.px4_airframe import NONE_IRIS
 from sitl.px4_bridge import HIL_PORT, LIDAR_COMPONENT, LIDAR_PORT, Bridge, BridgeLinks
-from sitl.px4_ear import Px4Ear
+from sitl.px4_ear import EAR_PORT, Px4Ear
 from sitl.px4_plant import Plant
 from sitl.truth_log import TruthFile
 from sitl.vehicle_config import VehicleConfig
@@ -26,7 +25,7 @@ def open_plant(config: VehicleConfig) -> Plant:
     return Plant(config.world, config.sim, NONE_IRIS)
 
 
-def open_links(config: VehicleConfig, plant: Plant, clock: Clock, stack: ExitStack, say: Say) -> BridgeLinks:
+def open_links(config: VehicleConfig, plant: Plant, clock: Clock, stack: ExitStack) -> BridgeLinks:
     """All ports, closed with the stack. Raises TransportError naming one in use."""
     instance = config.instance
     system = instance + 1  # as PX4 numbers itself
@@ -34,13 +33,13 @@ def open_links(config: VehicleConfig, plant: Plant, clock: Clock, stack: ExitSta
     stack.callback(tcp.close)
     lidar = udp_out(HOST, LIDAR_PORT + instance, clock=clock)
     stack.callback(lidar.close)
-    ear = udp_out(HOST, px4_ear.PX4_PORT + instance, px4_ear.LOCAL_PORT + instance, clock)
+    ear = udp_in(HOST, EAR_PORT + instance, clock)
     stack.callback(ear.close)
     return BridgeLinks(
         hil=Connection(tcp, system, VEHICLE_COMPONENT, clock=clock),
         tcp=tcp,
         lidar=Connection(lidar, system, LIDAR_COMPONENT, clock=clock),
-        ear=Px4Ear(Connection(ear, system, px4_ear.COMPONENT, clock=clock), system, plant.status, say),
+        ear=Px4Ear(Connection(ear, system, VEHICLE_COMPONENT, clock=clock), system, plant.status),
     )
 
 

@@ -144,7 +144,7 @@ class Bridge:
 
     def _at_scan(self) -> None:
         now_s = self._clock.now_s()
-        self._links.ear.listen(now_s)
+        self._links.ear.listen()
         self._links.lidar.send(encode_scan(self.plant.observe()))
         self._links.lidar.receive()  # the companion's heartbeat: only to be taken off the socket
         if self._truth is not None:
