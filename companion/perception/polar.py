@@ -68,10 +68,9 @@ def _in_body_plane(rotation: F64) -> tuple[F64, F64]:
     """The azimuth directions seen in the body plane, not normalised: P inverted and applied."""
     (a, b), (c, d) = rotation[:2, :2].tolist()
     determinant = a * d - b * c
-    north, east = AZIMUTH_DIR[:, 0], AZIMUTH_DIR[:, 1]
-    forward: F64 = (d * north - b * east) / determinant
-    right: F64 = (a * east - c * north) / determinant
-    return forward, right
+    inverse = np.array([[d / determinant, -c / determinant], [-b / determinant, a / determinant]])  # transposed
+    in_plane = AZIMUTH_DIR @ inverse
+    return in_plane[:, 0], in_plane[:, 1]
 
 
 def _sector_of(bearing_rad: F64, scan: Scan) -> NDArray[np.intp]:
@@ -90,11 +89,15 @@ def _trusted_height_m(height_m: float, margin_m: float) -> float:
 
 def _ground_slant_m(scan: Scan, rotation: F64, height_m: float) -> F64:
     """Slant range (n,) from which a return of each sector may be the ground; inf for level and rising sectors."""
-    edge = scan.angle_offset_rad + (np.arange(scan.range_m.shape[0] + 1) - 0.5) * scan.increment_rad
-    drop = rotation[2, 0] * np.cos(edge) + rotation[2, 1] * np.sin(edge)  # metres down per slant metre
+    n = scan.range_m.shape[0]
+    forward, right = rotation[2, :2].tolist()
+    most = math.hypot(forward, right)
+    if most * scan.range_max_m < height_m:
+        return np.full(n, np.inf)
+    edge = scan.angle_offset_rad + (np.arange(n + 1) - 0.5) * scan.increment_rad
+    drop = forward * np.cos(edge) + right * np.sin(edge)  # metres down per slant metre
     steepest = np.maximum(drop[:-1], drop[1:])
-    peak = int(_sector_of(np.array([math.atan2(rotation[2, 1], rotation[2, 0])]), scan)[0])
-    steepest[peak] = math.hypot(rotation[2, 0], rotation[2, 1])
+    steepest[_sector_of(np.array(math.atan2(right, forward)), scan)] = most
     falling = steepest > LEVEL
     return np.where(falling, height_m / np.where(falling, steepest, 1.0), np.inf)
 
@@ -102,5 +105,5 @@ def _ground_slant_m(scan: Scan, rotation: F64, height_m: float) -> F64:
 def _at_bearings(horizontal_m: F64, rotation: F64) -> F64:
     """Ranges at the fixed bearings off the nose."""
     yaw = math.atan2(rotation[1, 0], rotation[0, 0])
-    bins = ((BEARING_RAD + yaw) % math.tau * (AZIMUTH_BINS / math.tau)).astype(np.intp) % AZIMUTH_BINS
-    return horizontal_m.take(bins)
+    bins = ((BEARING_RAD + (yaw + math.tau)) * (AZIMUTH_BINS / math.tau)).astype(np.intp)
+    return horizontal_m.take(bins, mode="wrap")
