@@ -15,6 +15,7 @@ from mission.cli_options import (
     ParamSet,
     Px4Bin,
     Seed,
+    SignKey,
     Speed,
     parse_firmware,
     parse_overrides,
@@ -47,6 +48,7 @@ def fly(
     operator_url: OperatorUrl = None,
     firmware: FirmwareName = "embedded",
     px4_bin: Px4Bin = None,
+    sign_key: SignKey = None,
     out: Out = None,
     json: Json = False,
 ) -> None:
@@ -61,7 +63,7 @@ def fly(
 
     times, in_step = parse_speed(speed, lockstep)
     who, px4 = parse_firmware(firmware, px4_bin)
-    settings = FlySettings(times, in_step, instance, operator_url, who, px4)
+    settings = FlySettings(times, in_step, instance, operator_url, who, px4, sign_key)
     plan = plan_flight(mission, seed, parse_overrides(params, param), world, policy, fault or ())
     if who.value == "px4":
         plan = with_gps_tolerance(plan)

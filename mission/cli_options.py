@@ -32,6 +32,9 @@ Faults = Annotated[
         "--fault", metavar="NAME[=VALUE][@START[..END]]", help="Break something, e.g. gps_off@30; repeatable."
     ),
 ]
+SignKey = Annotated[
+    Path | None, typer.Option("--sign-key", metavar="FILE", help="Sign the MAVLink links with the key of this file.")
+]
 ParamFile = Annotated[Path | None, typer.Option("--params", metavar="FILE", help="YAML with {group: {field: value}}.")]
 FirmwareName = Annotated[str, typer.Option("--firmware", help="Who flies: embedded, or px4 (a real one).")]
 Px4Bin = Annotated[

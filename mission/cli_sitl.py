@@ -14,6 +14,7 @@ from mission.cli_options import (
     Lockstep,
     Px4Bin,
     Seed,
+    SignKey,
     Speed,
     parse_firmware,
     parse_speed,
@@ -46,6 +47,7 @@ def sitl(
     instance: Instance = 0,
     firmware: FirmwareName = "embedded",
     px4_bin: Px4Bin = None,
+    sign_key: SignKey = None,
     out: Out = None,
     json: Json = False,
 ) -> int:
@@ -68,7 +70,9 @@ def sitl(
         seed, spawn, math.radians(_finite(yaw, "--yaw")), _wind(wind, turbulence), faults=tuple(fault or ())
     )
     settings = FlySettings(times, in_step, instance)
-    config = VehicleConfig(place.seeded(seed), sim, settings.run_config, instance, log_dir=out, firmware=who)
+    config = VehicleConfig(
+        place.seeded(seed), sim, settings.run_config, instance, log_dir=out, firmware=who, sign_key=sign_key
+    )
     if json:
         print_json(config.to_json())
     with running(px4, instance, out):

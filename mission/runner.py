@@ -23,7 +23,7 @@ from mission.judge import Result, judge
 from mission.processes import INSTANCE_MAX, Child, Children, wait_for_end
 from mission.px4_firmware import Px4Build
 from mission.simulate import sim_config
-from sitl.link import SPECS
+from sitl.link import HOST, SPECS
 from sitl.server import RunConfig
 from sitl.vehicle_config import Firmware, VehicleConfig
 
@@ -43,11 +43,13 @@ class FlySettings:
     operator_url: str | None = None
     firmware: Firmware = Firmware.EMBEDDED
     px4: Px4Build | None = None  # with firmware PX4: started here; None: somebody else starts one
+    sign_key: Path | None = None  # of the companion's and the ground station's link
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready."""
         px4 = str(self.px4.binary) if self.px4 is not None else None
-        return asdict(self) | {"speed": str(self.speed), "px4": px4}
+        key = str(self.sign_key) if self.sign_key is not None else None
+        return asdict(self) | {"speed": str(self.speed), "px4": px4, "sign_key": key}
 
     @property
     def run_config(self) -> RunConfig:
@@ -152,13 +154,14 @@ def companion_arguments(plan: FlightPlan, settings: FlySettings, folder: Path) -
     if plan.task.down_m is not None:
         goal.append(repr(plan.task.down_m))
     return [
-        *("--vehicle", f"udpin://0.0.0.0:{COMPANION_PORT + settings.instance}"),
+        *("--vehicle", f"udpin://{HOST}:{COMPANION_PORT + settings.instance}"),
         *("--goal", *goal),
         *("--cruise", repr(plan.task.cruise_m_s)),
         *("--params", str(folder / "params.yaml")),
         *("--log", str(folder)),
         *("--seed", str(plan.seed)),
         *(("--lidar", px4_firmware.lidar_url(settings.instance)) if settings.firmware is Firmware.PX4 else ()),
+        *(("--sign-key", str(settings.sign_key)) if settings.sign_key is not None else ()),
     ]
 
 
@@ -171,6 +174,7 @@ def vehicle_config(plan: FlightPlan, settings: FlySettings, folder: Path | None)
         settings.instance,
         log_dir=folder,
         firmware=settings.firmware,
+        sign_key=settings.sign_key,
     )
 
 

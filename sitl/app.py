@@ -5,21 +5,23 @@ cannot be written.
 """
 
 import contextlib
+import dataclasses
 import importlib.metadata
 import json
 import platform
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final
 
-from companion.core.clock import SystemClock
+from companion.core.clock import Clock, SystemClock
+from companion.core.keyring import KeyFileError, Keyring
 from companion.core.transport import TransportError
 from companion.core.types import F64
 from sitl import px4_app
-from sitl.link import SPECS, bind, open_links
+from sitl.link import SPECS, Link, bind, open_links
 from sitl.px4_bridge import Bridge
 from sitl.server import Server
 from sitl.simulation import Simulation
@@ -39,7 +41,7 @@ def run(config: VehicleConfig, say: Say | None = None) -> int:
     with _stop_on_signals() as stopped, ExitStack() as stack:
         try:
             program = (_open_px4 if config.firmware is Firmware.PX4 else _open)(config, stack, tell)
-        except (TransportError, ConfigError) as error:
+        except (TransportError, KeyFileError, ConfigError) as error:
             tell(str(error))
             return EXIT_BAD_INPUT
         except OSError as error:
@@ -58,19 +60,26 @@ def _open(config: VehicleConfig, stack: ExitStack, say: Say) -> Server:
         sim = Simulation(config.world, config.sim)
     except (KeyError, ValueError) as error:
         raise ConfigError(str(error.args[0])) from error
+    keyring = _open_keyring(config, clock)
     bound = bind(config.instance, clock)
     for _, transport in bound:
         stack.callback(transport.close)
     truth = _open_truth(config, sim.spawn_ned_m, stack)
-    links = open_links(bound, config.system_id, config.log_dir, clock)
+    links = open_links(bound, config.system_id, config.log_dir, clock, keyring)
     for link in links:
         stack.callback(link.close)
+    if config.log_dir is not None:
+        stack.callback(_write_counts, links, config.log_dir / "links.json")
     return Server(sim, links, config.run, clock, config.system_id, truth, say)
 
 
 def _open_px4(config: VehicleConfig, stack: ExitStack, say: Say) -> Bridge:
     """The same for the bridge to a real PX4."""
     clock = SystemClock()
+    if config.sign_key is not None:
+        raise ConfigError(
+            "signing ends at the simulator port: PX4 v1.16 cannot sign, later ones are given the key themselves"
+        )
     try:
         plant = px4_app.open_plant(config)
     except ValueError as error:
@@ -78,6 +87,12 @@ def _open_px4(config: VehicleConfig, stack: ExitStack, say: Say) -> Bridge:
     links = px4_app.open_links(config, plant, clock, stack)
     truth = _open_truth(config, plant.spawn_ned_m, stack)
     return px4_app.open_bridge(config, plant, links, clock, truth, say)
+
+
+def _open_keyring(config: VehicleConfig, clock: Clock) -> Keyring | None:
+    if config.sign_key is None:
+        return None
+    return Keyring(config.sign_key, f"vehicle_{config.system_id}_{config.instance}", clock)
 
 
 def _open_truth(config: VehicleConfig, spawn_ned_m: F64, stack: ExitStack) -> TruthFile | None:
@@ -105,6 +120,12 @@ def _stop_on_signals() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _write_counts(links: Sequence[Link], path: Path) -> None:
+    """What each link has seen, refused packets among it."""
+    counts = {link.name: dataclasses.asdict(link.connection.counts) for link in links}
+    path.write_text(json.dumps(counts, indent=1) + "\n", encoding="utf-8")
 
 
 def _write_versions(config: VehicleConfig, path: Path) -> None:

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from companion.core.clock import Clock
+from companion.core.keyring import Keyring
 from companion.core.mavlink import Connection
+from companion.core.signing import PX4_UNSIGNED
 from companion.core.tlog import TlogWriter
 from companion.core.transport import Transport, TransportError
 from companion.core.udp import udp_out
@@ -27,11 +29,13 @@ class LinkSpec:
     remote_port: int
     rates_hz: Mapping[int, float]
     companion: bool = False
+    signs: bool = True  # when there is a key
 
 
 SPECS: Final = (
     LinkSpec("companion", 14580, 14540, ONBOARD_HZ, companion=True),
-    LinkSpec("operator", 14280, 14030, ONBOARD_HZ),  # PX4's payload port, here at full rate
+    # PX4's payload port, here at full rate. MAVSDK, which our operator uses, cannot sign: this link never leaves HOST.
+    LinkSpec("operator", 14280, 14030, ONBOARD_HZ, signs=False),
     LinkSpec("gcs", 18570, 14550, GCS_HZ),
 )
 
@@ -79,11 +83,19 @@ def bind(instance: int, clock: Clock) -> list[tuple[LinkSpec, Transport]]:
 
 
 def open_links(
-    bound: list[tuple[LinkSpec, Transport]], system_id: int, log_dir: Path | None, clock: Clock
+    bound: list[tuple[LinkSpec, Transport]],
+    system_id: int,
+    log_dir: Path | None,
+    clock: Clock,
+    keyring: Keyring | None = None,
 ) -> list[Link]:
-    """Links over bound ports, each with a log in ``log_dir``. Raises OSError when that cannot be written."""
+    """Links over bound ports, each with a log in ``log_dir``. Raises OSError when that cannot be written.
+
+    With ``keyring`` all sign that can; link ids are PX4's instance numbers.
+    """
     links = []
-    for spec, transport in bound:
+    for link_id, (spec, transport) in enumerate(bound):
+        signing = keyring.link(link_id, PX4_UNSIGNED) if keyring is not None and spec.signs else None
         tlog = TlogWriter(log_dir / f"vehicle_{spec.name}.tlog") if log_dir is not None else None
-        links.append(Link(spec, Connection(transport, system_id, COMPONENT, tlog, clock), tlog))
+        links.append(Link(spec, Connection(transport, system_id, COMPONENT, tlog, clock, signing=signing), tlog))
     return links

@@ -33,7 +33,7 @@ CRUISE_M_S = 3.0
 ELSEWHERE = [50.0, 0.0]  # a goal for a check that was not told one
 EXAMPLE = """\
 example:
-  python -m companion --vehicle udpin://0.0.0.0:14540 --goal 55 0 -3 --cruise 4 --log flights/first
+  python -m companion --vehicle udpin://127.0.0.1:14540 --goal 55 0 -3 --cruise 4 --log flights/first
   python -m companion --vehicle serial:///dev/serial0:921600 --lidar lds2d:LD19:/dev/ttyUSB0 --check
 """
 
@@ -70,6 +70,8 @@ def parser(prog: str = "python -m companion") -> OneLineParser:
     add("--engage", choices=list(Engage), type=Engage, default=Engage.WAIT, help="auto: ask for OFFBOARD ourselves")
     add("--connect-timeout", metavar="S", type=_number, default=30.0, help="give up without a vehicle after this")
     add("--instance", metavar="N", type=int, default=0, help="added to the port of the default URL")
+    key_help = "key file: sign every MAVLink packet, believe only signed ones (default: believe everybody)"
+    add("--sign-key", metavar="FILE", type=Path, help=key_help)
     add("--seed", metavar="N", type=int, default=0, help="kept with the flight's log")
     add("--check", action="store_true", help="do not fly: say what is missing before the take-off, exit 6 if unfit")
     add("--check-time", metavar="S", type=_number, default=LISTEN_S, help="how long to listen (default: %(default)s)")
@@ -136,6 +138,7 @@ def config_from(given: argparse.Namespace) -> CompanionConfig:
         params=params.update(Params(), read_params(given.params)) if given.params else Params(),
         engage=given.engage,
         connect_timeout_s=given.connect_timeout,
+        sign_key=given.sign_key,
         seed=given.seed,
     )
 

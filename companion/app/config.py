@@ -10,7 +10,7 @@ from companion.core.url import UrlError, parse_url
 from companion.link.lidar_url import parse_lidar
 from companion.navigator import Params
 
-VEHICLE_URL = "udpin://0.0.0.0:14540"  # where PX4 sends to a companion
+VEHICLE_URL = "udpin://127.0.0.1:14540"  # where PX4 sends to a companion, if it runs on this machine
 CRUISE_MAX_M_S = 20.0  # top speed of the aircraft in models/
 
 
@@ -38,6 +38,9 @@ class CompanionConfig:
     connect_timeout_s: float = 30.0  # wall time until the vehicle must have been heard
     lost_timeout_s: float = 3.0  # wall time of silence after which it counts as lost (MAVSDK's figure)
     system: int = 1  # MAVLink system id until the vehicle's own is known
+    sign_key: Path | None = (
+        None  # file of the key that signs and judges every MAVLink link; None: everybody is believed
+    )
     seed: int = 0  # kept with the flight; the navigator draws nothing
 
 

@@ -8,14 +8,17 @@ from pymavlink.dialects.v20 import common as mav
 from companion.app.config import CompanionConfig
 from companion.core import codec
 from companion.core.clock import Clock
+from companion.core.keyring import Keyring
 from companion.core.mavlink import Connection, PacketLog
+from companion.core.signing import COMPANION_UNSIGNED
 from companion.core.transport import Transport
-from companion.core.url import open_url
+from companion.core.url import Url, listens_wide, open_url, parse_url
 from companion.link.lidar import Lidar, MavlinkLidar
 from companion.link.lidar_replay import ReplayLidar
 from companion.link.lidar_serial import SerialLidar
 from companion.link.lidar_url import ReplayFile, SerialModel, parse_lidar
 
+VEHICLE_LINK, LIDAR_LINK = 0, 1  # link ids of signatures
 SCANS = frozenset({int(mav.MAVLINK_MSG_ID_OBSTACLE_DISTANCE)})
 
 
@@ -27,13 +30,15 @@ class Opened:
     lidar: (
         Transport | ReplayLidar | SerialLidar | None
     )  # a transport: a LiDAR that speaks MAVLink; None: the vehicle passes scans on
+    keyring: Keyring | None = None  # of signed links
 
 
 def open_all(config: CompanionConfig, clock: Clock, stack: ExitStack) -> Opened:
-    """Open what ``config`` names, closed with the stack. Raises TransportError or LidarError."""
+    """Open what ``config`` names, closed with the stack. Raises KeyFileError, TransportError or LidarError."""
+    keyring = _open_keyring(config, clock, stack)
     vehicle = stack.enter_context(closing(open_url(config.vehicle_url, clock)))
     lidar = _open_lidar(config, clock)
-    return Opened(vehicle, stack.enter_context(closing(lidar)) if lidar is not None else None)
+    return Opened(vehicle, stack.enter_context(closing(lidar)) if lidar is not None else None, keyring)
 
 
 def connect(
@@ -45,11 +50,34 @@ def connect(
     """
     ids = (config.system, codec.COMPANION_COMPONENT)
     ignored = SCANS if opened.lidar is not None else frozenset[int]()
-    vehicle = Connection(opened.vehicle, *ids, log, clock, ignored)
+    ring = opened.keyring
+    signing = [ring.link(i, COMPANION_UNSIGNED) if ring is not None else None for i in (VEHICLE_LINK, LIDAR_LINK)]
+    vehicle = Connection(opened.vehicle, *ids, log, clock, ignored, signing[VEHICLE_LINK])
     lidar = opened.lidar
     if lidar is None or isinstance(lidar, ReplayLidar | SerialLidar):
         return vehicle, lidar
-    return vehicle, MavlinkLidar(Connection(lidar, *ids, log, clock))
+    return vehicle, MavlinkLidar(Connection(lidar, *ids, log, clock, signing=signing[LIDAR_LINK]))
+
+
+def exposed(config: CompanionConfig) -> str | None:
+    """A warning, when the whole network may steer."""
+    urls = [parse_url(config.vehicle_url)]
+    lidar = parse_lidar(config.lidar_url) if config.lidar_url is not None else None
+    urls += [lidar] if isinstance(lidar, Url) else []
+    wide = [str(url) for url in urls if listens_wide(url)]
+    if not wide or config.sign_key is not None:
+        return None
+    return (
+        f"warning: {' and '.join(wide)} believes everybody on the network: give --sign-key FILE, or listen on 127.0.0.1"
+    )
+
+
+def _open_keyring(config: CompanionConfig, clock: Clock, stack: ExitStack) -> Keyring | None:
+    if config.sign_key is None:
+        return None
+    keyring = Keyring(config.sign_key, f"companion_{parse_url(config.vehicle_url).port}", clock)
+    stack.callback(keyring.close)
+    return keyring
 
 
 def _open_lidar(config: CompanionConfig, clock: Clock) -> Transport | ReplayLidar | SerialLidar | None:

@@ -11,13 +11,14 @@ from companion import navigator as companion_navigator
 from companion.app.config import CompanionConfig, ConfigError, check
 from companion.app.logs import FlightLogs, LogFolderError
 from companion.app.memory_use import peak_rss_mb
-from companion.app.opening import connect, open_all
+from companion.app.opening import connect, exposed, open_all
 from companion.app.process import Companion, OnStatus, Say
 from companion.app.session import Navigator
 from companion.app.signals import StopRequest, stop_on_signals
 from companion.app.status import ExitCode, Summary
 from companion.core import params
 from companion.core.clock import Clock, SystemClock
+from companion.core.keyring import KeyFileError
 from companion.core.transport import TransportError
 from companion.link.lidar import LidarError
 
@@ -49,7 +50,7 @@ def fly(
             check(config)
             opened = open_all(config, clock, stack)
             logs = stack.enter_context(closing(FlightLogs(config.log_dir)))
-        except (ConfigError, TransportError, LidarError, LogFolderError) as error:
+        except (ConfigError, KeyFileError, TransportError, LidarError, LogFolderError) as error:
             say(str(error))
             return Summary(int(ExitCode.BAD_INPUT), str(error), 0, "", str(config.log_dir))
         if stop is None:
@@ -59,6 +60,9 @@ def fly(
         logs.event("start", **_described(config))
         companion = Companion(config, vehicle, lidar, logs, navigator, clock)
         companion.say, companion.on_status = say, on_status
+        warning = exposed(config)
+        if warning is not None:
+            say(warning)
         while companion.exit_code is None:
             companion.turn(stop)
         return _ended(companion, config, logs, say)
@@ -87,6 +91,7 @@ def _described(config: CompanionConfig) -> dict[str, Any]:
     return {
         "vehicle_url": config.vehicle_url,
         "lidar_url": config.lidar_url,
+        "signed": config.sign_key is not None,
         "engage": str(config.engage),
         "goal_ned_m": task.goal_ned_m.tolist(),
         "down_m": task.down_m,

@@ -10,8 +10,10 @@ from typing import Any, Protocol
 from pymavlink.dialects.v20 import common as mav
 
 from companion.core.clock import Clock, SystemClock
+from companion.core.keyring import LinkSigning
+from companion.core.signing import Verdict
 from companion.core.tlog import packet_length
-from companion.core.transport import Transport, wait_readable
+from companion.core.transport import Transport, Vouchable, wait_readable
 
 Message = Any  # a MAVLink_*_message object; pymavlink's classes share no useful static type
 
@@ -28,13 +30,18 @@ class LinkCounts:
     bad_bytes: int = 0  # bytes that belonged to no valid packet
     lost: int = 0  # gaps in the senders' sequence numbers
     sent: int = 0
+    unsigned: int = 0  # whole packets refused on a signed link: without a signature,
+    forged: int = 0  # with one that our key did not make,
+    old: int = 0  # or with a timestamp that was overtaken: heard before
 
 
 class PacketParser:
-    """Cuts a stream of chunks into decoded messages."""
+    """Cuts a stream of chunks into decoded messages; on a signed link only those that may be believed."""
 
-    def __init__(self, counts: LinkCounts | None = None) -> None:
+    def __init__(self, counts: LinkCounts | None = None, signing: LinkSigning | None = None) -> None:
         self.counts = counts or LinkCounts()
+        self.signed = 0  # messages with a good signature so far
+        self._signing = signing
         self._mavlink = mav.MAVLink(None)
         self._buffer = bytearray()
 
@@ -58,12 +65,30 @@ class PacketParser:
             at += length
             if message.get_msgId() == mav.MAVLINK_MSG_ID_UNKNOWN:
                 self.counts.unknown += 1
-            else:
+            elif self._believed(message):
                 messages.append(message)
         del self._buffer[:at]
         self._limit_buffer()
         self.counts.received += len(messages)
         return messages
+
+    def _believed(self, message: Message) -> bool:
+        """May this message be acted upon? Counts it where not."""
+        if self._signing is None:
+            return True
+        verdict = self._signing.judge(bytes(message.get_msgbuf()))
+        if verdict is Verdict.GOOD:
+            self.signed += 1
+            return True
+        if verdict is Verdict.UNSIGNED:
+            if message.get_msgId() in self._signing.unsigned:
+                return True
+            self.counts.unsigned += 1
+        elif verdict is Verdict.FORGED:
+            self.counts.forged += 1
+        else:
+            self.counts.old += 1
+        return False
 
     def _starts_packet(self, chunk: bytes) -> bool:
         """True when ``chunk`` by itself begins with a whole packet of a known kind."""
@@ -113,12 +138,14 @@ class Connection:
         log: PacketLog | None = None,
         clock: Clock | None = None,
         ignored: frozenset[int] = frozenset(),
+        signing: LinkSigning | None = None,
     ) -> None:
-        """``ignored``: ids of messages that are neither delivered nor logged."""
+        """``ignored``: ids that are neither delivered nor logged. ``signing`` None: everybody is believed."""
         self.transport = transport
         self.counts = LinkCounts()
         self._mavlink = mav.MAVLink(None, srcSystem=system, srcComponent=component)
-        self._parser = PacketParser(self.counts)
+        self._signing = signing
+        self._parser = PacketParser(self.counts, signing)
         self._reader = mav.MAVLink(None)
         self._log = log
         self._clock = clock or SystemClock()
@@ -129,6 +156,8 @@ class Connection:
         """Send messages as one chunk (one datagram on UDP)."""
         chunk = b""
         for message in messages:
+            if self._signing is not None:
+                self._signing.prepare(self._mavlink)
             packet = message.pack(self._mavlink)
             self._mavlink.seq = (self._mavlink.seq + 1) % SEQUENCES
             if self._log is not None:
@@ -146,7 +175,9 @@ class Connection:
         """Messages that have arrived, oldest first; waits up to ``timeout_s`` for the first."""
         if timeout_s > 0.0:
             wait_readable([self.transport], timeout_s, self._clock)
-        messages = [message for chunk in self.transport.receive() for message in self._parser.feed(chunk)]
+        messages = [message for chunk in self.transport.receive() for message in self._feed(chunk)]
+        if self._signing is not None:
+            self._signing.tend()
         for message in messages:
             self._count_lost(message)
         if self._ignored:
@@ -164,6 +195,16 @@ class Connection:
     def close(self) -> None:
         """Close the transport; the log belongs to whoever opened it."""
         self.transport.close()
+        if self._signing is not None:
+            self._signing.close()
+
+    def _feed(self, chunk: bytes) -> list[Message]:
+        """The messages of a chunk; whoever signed one well is a partner, other strangers are not."""
+        before = self._parser.signed
+        messages = self._parser.feed(chunk)
+        if self._parser.signed > before and isinstance(self.transport, Vouchable):
+            self.transport.vouch(chunk)
+        return messages
 
     def _count_lost(self, message: Message) -> None:
         sender = (message.get_srcSystem(), message.get_srcComponent())

@@ -7,7 +7,7 @@ flight (a partner gone, a full buffer) is silence, not an exception; only openin
 import select
 from collections import deque
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from companion.core.clock import Clock, SystemClock
 
@@ -56,6 +56,14 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Free the port; may be called twice."""
+
+
+@runtime_checkable
+class Vouchable(Protocol):
+    """A transport with partners that anybody can become by speaking to it."""
+
+    def vouch(self, chunk: bytes) -> None:
+        """Who sent this received chunk can be trusted: from now on only such partners are answered."""
 
 
 def wait_readable(transports: Sequence[Waitable], timeout_s: float, clock: Clock | None = None) -> bool:

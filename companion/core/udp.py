@@ -1,7 +1,8 @@
 """How do bytes travel over UDP? IPv4; listens for partners (``udpin``) or sends to a known one (``udpout``).
 
 Every source that was heard is a partner and gets what is sent, until it has been silent for ten seconds (as MAVSDK
-does); the address given to ``udpout`` is one always.
+does); the address given to ``udpout`` is one always. There are not many: a crowd of strangers must not make each
+message a hundred. Where partners sign, strangers are forgotten as soon as one has been vouched for.
 """
 
 import errno
@@ -17,6 +18,15 @@ FORGET_S = 10.0  # MAVSDK's REMOTE_TIMEOUT of a udpin connection
 RECEIVE_BUFFER_BYTES = 1 << 20
 DATAGRAM_MAX_BYTES = 65535
 DATAGRAMS_PER_CALL = 512  # a flood must not keep the caller from its work
+PARTNERS_MAX = 16
+
+LOOPBACK = "127.0.0.1"
+
+
+class Datagram(bytes):
+    """A chunk that remembers who sent it."""
+
+    source: Address | None = None
 
 
 class Udp:
@@ -28,6 +38,7 @@ class Udp:
         self._clock = clock or SystemClock()
         self._fixed = _resolve(remote) if remote is not None else None
         self._heard_s: dict[Address, float] = {}
+        self._vouched: set[Address] = set()
         self._socket = _bound_socket(bind)
         self._open = True
 
@@ -47,6 +58,7 @@ class Udp:
         for address, heard_s in list(self._heard_s.items()):
             if now_s - heard_s > FORGET_S:
                 del self._heard_s[address]
+                self._vouched.discard(address)
         return [self._fixed, *self._heard_s] if self._fixed is not None else list(self._heard_s)
 
     def send(self, data: bytes) -> None:
@@ -70,9 +82,26 @@ class Udp:
             except BlockingIOError:
                 break
             if address != self._fixed:
-                self._heard_s[address] = self._clock.now_s()
-            datagrams.append(data)
+                self._hear(address)
+            datagram = Datagram(data)
+            datagram.source = address
+            datagrams.append(datagram)
         return datagrams
+
+    def vouch(self, chunk: bytes) -> None:
+        """The sender of this datagram can be trusted; strangers are no partners any more."""
+        source = chunk.source if isinstance(chunk, Datagram) else None
+        if source is None:
+            return
+        self._vouched.add(source)
+        if source != self._fixed:
+            self._heard_s[source] = self._clock.now_s()
+        self._heard_s = {address: heard_s for address, heard_s in self._heard_s.items() if address in self._vouched}
+
+    def _hear(self, address: Address) -> None:
+        known = address in self._heard_s
+        if known or (not self._vouched and len(self.partners()) < PARTNERS_MAX):
+            self._heard_s[address] = self._clock.now_s()
 
     def files(self) -> Sequence[Selectable]:
         """The socket."""
@@ -94,8 +123,17 @@ def udp_in(host: str, port: int, clock: Clock | None = None) -> Udp:
 
 
 def udp_out(host: str, port: int, local_port: int = 0, clock: Clock | None = None) -> Udp:
-    """Send to ``host:port`` from ``local_port`` (0: any); others who speak to that port are answered as well."""
-    return Udp(f"udpout://{host}:{port}", ("0.0.0.0", local_port), (host, port), clock)
+    """Send to ``host:port`` from ``local_port`` (0: any); others who speak to that port are answered as well.
+
+    A partner on this machine is spoken to from an address that only this machine reaches.
+    """
+    here = is_loopback(_resolve((host, port))[0])
+    return Udp(f"udpout://{host}:{port}", (LOOPBACK if here else "0.0.0.0", local_port), (host, port), clock)
+
+
+def is_loopback(host: str) -> bool:
+    """Is this an address that no other machine reaches?"""
+    return host == "localhost" or host.startswith("127.")
 
 
 def _resolve(address: Address) -> Address:

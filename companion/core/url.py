@@ -1,7 +1,8 @@
 """Which transport does a connection URL name? Written as MAVSDK writes them.
 
-``udpin://0.0.0.0:14540``, ``udpout://192.168.1.7:14550``, ``tcpin://0.0.0.0:5760``, ``tcpout://127.0.0.1:5760``,
-``serial:///dev/ttyUSB0:57600``.
+``udpin://127.0.0.1:14540``, ``udpout://192.168.1.7:14550``, ``tcpin://0.0.0.0:5760``, ``tcpout://127.0.0.1:5760``,
+``serial:///dev/ttyUSB0:57600``. Without a host ``udpin`` and ``tcpin`` listen to this machine only: to listen wider is
+a decision, and written down as 0.0.0.0.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from companion.core.clock import Clock
 from companion.core.params import nearest
 from companion.core.tcp import tcp_in, tcp_out
 from companion.core.transport import Transport
-from companion.core.udp import udp_in, udp_out
+from companion.core.udp import LOOPBACK, is_loopback, udp_in, udp_out
 
 SCHEMES = ("udpin", "udpout", "tcpin", "tcpout", "serial")
 DEFAULT_BAUD = 57600  # PX4's TELEM1 (SER_TEL1_BAUD)
@@ -34,11 +35,16 @@ class Url:
         return f"{self.scheme}://{self.host}:{self.port}"
 
 
+def listens_wide(url: Url) -> bool:
+    """Can other machines speak to us here without being asked?"""
+    return url.scheme in ("udpin", "tcpin") and not is_loopback(url.host)
+
+
 def parse_url(text: str) -> Url:
     """Take a URL apart. Raises UrlError with one line that quotes it."""
     scheme, separator, rest = text.strip().partition("://")
     if not separator:
-        raise UrlError(f"'{text}' is no connection URL; expected for example udpin://0.0.0.0:14540")
+        raise UrlError(f"'{text}' is no connection URL; expected for example udpin://127.0.0.1:14540")
     if scheme in ("udp", "tcp"):
         raise UrlError(f"'{text}' does not say who calls: write {scheme}in://HOST:PORT or {scheme}out://HOST:PORT")
     if scheme not in SCHEMES:
@@ -48,7 +54,7 @@ def parse_url(text: str) -> Url:
     host, _, port = rest.partition(":")
     if not host and scheme.endswith("out"):
         raise UrlError(f"'{text}': {scheme} needs a host, for example {scheme}://127.0.0.1:14540")
-    return Url(scheme, host or "0.0.0.0", _number(text, port, "port", PORT_MAX))
+    return Url(scheme, host or LOOPBACK, _number(text, port, "port", PORT_MAX))
 
 
 def open_url(url: Url | str, clock: Clock | None = None) -> Transport:

@@ -81,7 +81,7 @@ def test_no_vehicle_within_the_time_given_is_one_line(tmp_path: Path) -> None:
     bench.vehicle.sends_anything = False
     bench.run(6.0)
     assert bench.companion.exit_code == 3
-    assert bench.said == ["no vehicle answered on udpin://0.0.0.0:14540 within 5 s"]
+    assert bench.said == ["no vehicle answered on udpin://127.0.0.1:14540 within 5 s"]
 
 
 def test_a_vehicle_that_falls_silent_in_flight_ends_the_run(tmp_path: Path) -> None:

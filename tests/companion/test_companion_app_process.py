@@ -220,11 +220,12 @@ def test_a_log_folder_that_cannot_be_written_is_one_line_before_anything_is_sent
 def test_the_default_url_moves_with_the_instance(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--goal", "50", "0", "--instance", "7", "--connect-timeout", "0.1", "--log", str(tmp_path), "--json"]
     assert main(arguments) == 3
-    assert "no vehicle answered on udpin://0.0.0.0:14547 within 0.1 s" in json.loads(capsys.readouterr().out)["reason"]
+    reason = json.loads(capsys.readouterr().out)["reason"]
+    assert "no vehicle answered on udpin://127.0.0.1:14547 within 0.1 s" in reason
 
 
 def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["--help"])
     assert ended.value.code == 0
-    assert "python -m companion --vehicle udpin://0.0.0.0:14540 --goal 55 0 -3" in capsys.readouterr().out
+    assert "python -m companion --vehicle udpin://127.0.0.1:14540 --goal 55 0 -3" in capsys.readouterr().out

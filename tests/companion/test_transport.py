@@ -13,8 +13,8 @@ from companion.core.clock import ManualClock, SystemClock
 from companion.core.lossy import Loss, LossyTransport
 from companion.core.tcp import tcp_in, tcp_out
 from companion.core.transport import Transport, TransportError, pair, wait_readable
-from companion.core.udp import FORGET_S, udp_in, udp_out
-from companion.core.url import Url, UrlError, open_url, parse_url
+from companion.core.udp import FORGET_S, PARTNERS_MAX, udp_in, udp_out
+from companion.core.url import Url, UrlError, listens_wide, open_url, parse_url
 
 
 @pytest.fixture
@@ -198,7 +198,7 @@ def test_a_lossy_link_delays_what_comes_in_as_well() -> None:
     ("text", "url"),
     [
         ("udpin://0.0.0.0:14540", Url("udpin", "0.0.0.0", 14540)),
-        ("udpin://:14540", Url("udpin", "0.0.0.0", 14540)),
+        ("udpin://:14540", Url("udpin", "127.0.0.1", 14540)),
         ("udpout://127.0.0.1:1", Url("udpout", "127.0.0.1", 1)),
         ("tcpout://vehicle.local:5760", Url("tcpout", "vehicle.local", 5760)),
         ("serial:///dev/ttyUSB0:921600", Url("serial", "/dev/ttyUSB0", 921600)),
@@ -246,3 +246,41 @@ def test_the_system_clock_moves_on() -> None:
     clock.sleep_s(0.01)
     assert clock.now_s() - before_s >= 0.009
     assert clock.wall_us() - before_us >= 9000
+
+
+def test_a_crowd_of_strangers_does_not_multiply_what_is_sent() -> None:
+    with closing(udp_in("127.0.0.1", 0)) as server:
+        crowd = [udp_out("127.0.0.1", server.port) for _ in range(PARTNERS_MAX + 20)]
+        for stranger in crowd:
+            stranger.send(b"hello")
+        wait_readable([server], 1.0)
+        assert len(server.receive()) == len(crowd)
+        assert len(server.partners()) == PARTNERS_MAX
+        for stranger in crowd:
+            stranger.close()
+
+
+def test_who_was_vouched_for_is_answered_even_after_a_crowd_and_strangers_are_forgotten() -> None:
+    with closing(udp_in("127.0.0.1", 0)) as server:
+        crowd = [udp_out("127.0.0.1", server.port) for _ in range(PARTNERS_MAX + 1)]
+        for stranger in crowd:
+            stranger.send(bytes([crowd.index(stranger)]))
+        wait_readable([server], 1.0)
+        chunks = server.receive()
+        server.vouch(next(chunk for chunk in chunks if chunk == bytes([PARTNERS_MAX])))
+        assert server.partners() == [("127.0.0.1", crowd[-1].port)]
+        crowd[0].send(b"me too")
+        wait_readable([server], 1.0)
+        server.receive()
+        assert server.partners() == [("127.0.0.1", crowd[-1].port)]
+        for stranger in crowd:
+            stranger.close()
+
+
+def test_only_a_written_address_listens_beyond_this_machine() -> None:
+    assert not listens_wide(parse_url("udpin://:14540"))
+    assert not listens_wide(parse_url("tcpin://127.0.0.1:14540"))
+    assert listens_wide(parse_url("udpin://0.0.0.0:14540"))
+    assert not listens_wide(parse_url("udpout://192.168.1.7:14540"))
+    with closing(udp_out("127.0.0.1", 9)) as here:
+        assert here._socket.getsockname()[0] == "127.0.0.1"
