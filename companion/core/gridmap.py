@@ -65,7 +65,7 @@ class GridMap:
     free_t: F32  # (n, n) when last certified free
     hit_t: F32  # (n, n) when last hit, NEVER if free since
     hit_ne_m: F32  # (n, n, 2) the hit itself, finer than the cell
-    moved_ne_m: F64  # (m, 2) middle of each arc of the last scan that lies wholly in space certified free lately
+    moved_ne_m: F64  # (m, 2) middle of each arc of the last scan that lies, to a cell's depth, in space free lately
 
 
 def empty(params: MapParams) -> GridMap:
@@ -193,15 +193,18 @@ def _eroded(free_m: F32, table: "_PolarTable") -> F32:
 def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarScan, params: MapParams) -> F64:
     """Enter the hits: only where the arc was not certified free lately, or all of it if all of it was.
 
-    Returns the middles of the latter arcs, (m, 2).
+    Returns the middles of the latter arcs, (m, 2), but for those with a cell behind them that was not certified: the
+    rim of something that stands and is passed shows itself a few centimetres inside cells that count as free.
     """
     near = scan.hit_m < params.sense_m
     if not near.any():
         return np.empty((0, 2))
     range_m, sector = scan.hit_m[near], scan.hit_sector[near]
-    points = scan.pos_ne_m + AZIMUTH_DIR[scan.hit_bin[near]] * range_m[:, None]
+    direction = AZIMUTH_DIR[scan.hit_bin[near]]
+    points = scan.pos_ne_m + direction * range_m[:, None]
     flat, inside = cells_of(grid, points)
-    possible = inside & (free_t.take(flat) <= np.float32(max(scan.t_s - params.certified_s, 0.0)))
+    lately = np.float32(max(scan.t_s - params.certified_s, 0.0))
+    possible = inside & (free_t.take(flat) <= lately)
     whole = (np.bincount(sector, possible) == 0.0).take(sector)
     paint = inside & (possible | whole)
     cells = flat[paint]
@@ -209,6 +212,9 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     _place(hit_ne_m, cells, points[paint])
     if not whole.any():
         return np.empty((0, 2))
+    behind, there = cells_of(grid, points + direction * grid.cell_m)
+    stands = ~(there & (free_t.take(behind) > lately))
+    whole &= (np.bincount(sector, stands) == 0.0).take(sector)
     count = np.bincount(sector, whole)
     moved = np.flatnonzero(count)
     middle = [np.bincount(sector, whole * points[:, axis])[moved] / count[moved] for axis in (0, 1)]
