@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sitl.failsafe import Action, Cause, Clears, Facts, Response, Takeover, possible, responses
+from sitl.modes import FlightMode
 from sitl.px4_params import ParamStore
 
 
@@ -46,6 +47,8 @@ class FailsafeKeeper:
         if before > Action.HOLD or self._taken_over:
             self._hold_until_s = -math.inf
         action = self._worst(facts)
+        if facts.user_mode is FlightMode.LAND and action is Action.RETURN:
+            action = Action.WARN  # already landing: no turning back
         if self._delayable(action, facts):
             action, delayed = Action.HOLD, True
         elif self._take_over(action, facts):

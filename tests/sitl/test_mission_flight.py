@@ -128,7 +128,7 @@ def test_a_change_of_speed_is_flown(speed_m_s: float) -> None:
     while flight.ap.mission.reached != 2:
         flight.run(0.2)
         fastest = max(fastest, float(np.hypot(*flight.sim.truth.vel_ned_m_s[:2])))
-    assert fastest == pytest.approx(speed_m_s, abs=0.35)
+    assert fastest == pytest.approx(speed_m_s, abs=0.35, rel=0.12)
 
 
 def test_a_jump_repeats_its_leg_the_given_number_of_times() -> None:
