@@ -24,12 +24,13 @@ SCANS = frozenset({int(mav.MAVLINK_MSG_ID_OBSTACLE_DISTANCE)})
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """Ports and devices, before anything was said."""
+    """Ports and devices, before anything was said.
+
+    ``lidar``: a transport is the link of one that speaks MAVLink; None: the vehicle passes scans on.
+    """
 
     vehicle: Transport
-    lidar: (
-        Transport | ReplayLidar | SerialLidar | None
-    )  # a transport: a LiDAR that speaks MAVLink; None: the vehicle passes scans on
+    lidar: Transport | ReplayLidar | SerialLidar | None
     keyring: Keyring | None = None  # of signed links
 
 

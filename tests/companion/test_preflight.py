@@ -18,7 +18,7 @@ from companion.app.command_line import main
 from companion.app.config import CompanionConfig
 from companion.app.preflight.heard import Heard
 from companion.app.preflight.lidar_rows import lidar_rows
-from companion.app.preflight.own_rows import log_row, params_row, policy_row, rehearsal_row
+from companion.app.preflight.own_rows import belief_row, log_row, params_row, policy_row, rehearsal_row
 from companion.app.preflight.rows import Grade, Report, Row
 from companion.app.preflight.vehicle_rows import vehicle_rows
 from companion.core import codec, params
@@ -255,6 +255,15 @@ def test_our_own_settings_are_judged() -> None:
     assert [rehearsal_row([ms] * 9, None).grade for ms in (1.0, 30.0, 90.0)] == [Grade.OK, Grade.WARN, Grade.FAIL]
     assert rehearsal_row([], "ZeroDivisionError: x").grade is Grade.FAIL
     assert rehearsal_row([], None).grade is Grade.OPEN
+
+
+def test_who_is_believed_is_told() -> None:
+    assert belief_row(False, None, LinkCounts(received=9)).grade is Grade.OK
+    assert belief_row(False, "warning: the whole network may steer", LinkCounts(received=9)).grade is Grade.WARN
+    assert belief_row(True, None, LinkCounts(received=9)).found == "who has the key"
+    assert belief_row(True, None, LinkCounts(received=9, forged=2)).grade is Grade.WARN
+    keyless = belief_row(True, None, LinkCounts(unsigned=40))
+    assert (keyless.grade, keyless.advice) == (Grade.FAIL, "the vehicle needs the same key")
 
 
 def test_a_port_in_use_is_a_row_and_not_the_end(tmp_path: Path) -> None:

@@ -11,11 +11,12 @@ from pathlib import Path
 from companion import navigator
 from companion.app.config import CompanionConfig, ConfigError
 from companion.app.config import check as check_config
-from companion.app.opening import connect, open_all
+from companion.app.opening import connect, exposed, open_all
 from companion.app.preflight.heard import Heard
 from companion.app.preflight.lidar_rows import lidar_rows
 from companion.app.preflight.own_rows import (
     as_if_flying,
+    belief_row,
     log_row,
     params_row,
     policy_row,
@@ -26,6 +27,7 @@ from companion.app.preflight.rows import Grade, Report, Row
 from companion.app.preflight.vehicle_rows import PX4_PARAMS, vehicle_rows
 from companion.core import codec
 from companion.core.clock import Clock, SystemClock
+from companion.core.keyring import KeyFileError
 from companion.core.mavlink import Connection, LinkCounts
 from companion.core.param_codec import encode_param_request
 from companion.core.transport import TransportError, wait_readable
@@ -53,10 +55,11 @@ def check(
         try:
             check_config(config)
             opened = open_all(config, clock, stack)
-        except (ConfigError, TransportError, LidarError) as error:
+        except (ConfigError, KeyFileError, TransportError, LidarError) as error:
             return Report([*rows, Row("links", Grade.FAIL, str(error), "is a companion running already?")])
         vehicle, lidar = connect(opened, config, None, clock)
         heard = _Listener(config, vehicle, lidar, clock).listen(listen_s)
+    rows.append(belief_row(config.sign_key is not None, exposed(config), vehicle.counts))
     return Report([*rows, *_heard_rows(heard, vehicle.counts, config)])
 
 

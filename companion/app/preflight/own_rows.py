@@ -9,6 +9,7 @@ import numpy as np
 
 from companion.app.preflight.rows import Grade, Row
 from companion.core.inputs import Inputs
+from companion.core.mavlink import LinkCounts
 from companion.core.params import ParamError, infos
 from companion.core.task import Task
 from companion.core.types import AutopilotStatus, LandedState
@@ -57,6 +58,19 @@ def log_row(folder: str, free_bytes: int | None, problem: str | None) -> Row:
     found = f"{folder}: {free_bytes / 1e9:.1f} GB free"
     grade = Grade.FAIL if free_bytes < FREE_FAIL_BYTES else Grade.WARN if free_bytes < FREE_WARN_BYTES else Grade.OK
     return Row("log folder", grade, found, "" if grade is Grade.OK else "make room")
+
+
+def belief_row(signed: bool, warning: str | None, counts: LinkCounts) -> Row:
+    """Whose packets are believed? ``warning``: why everybody's are who should not be."""
+    name, refused = "who is believed", counts.unsigned + counts.forged + counts.old
+    if warning is not None:
+        return Row(name, Grade.WARN, "everybody on the network", "--sign-key FILE, or listen on 127.0.0.1")
+    if refused and not counts.received:
+        found = f"nobody: {counts.unsigned} unsigned, {counts.forged} forged, {counts.old} old packets refused"
+        return Row(name, Grade.FAIL, found, "the vehicle needs the same key")
+    if refused:
+        return Row(name, Grade.WARN, f"who has the key; {refused} packets refused", "somebody else speaks on this link")
+    return Row(name, Grade.OK, "who has the key" if signed else "this computer and its cables: no key given")
 
 
 def as_if_flying(ticks: Sequence[Inputs]) -> list[Inputs]:
