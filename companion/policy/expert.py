@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.core.geometry import resample
+from companion.core.geometry import length, resample
 from companion.core.gridmap import NEVER, GridMap, MapParams, cells_of, centres, occupied
 from companion.core.params import param
 from companion.core.types import F64
@@ -114,7 +114,7 @@ def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) ->
     if field.cost.ravel()[source] >= BLOCKED:
         source = _nearest_open(grid, field, query.prefix_ne_m[-1])
     ahead = _straight_cells(query)
-    kept = _kept(query, field, old)
+    kept = _kept(query, field, old, params)
     detours: tuple[float, ...] = (DETOUR_CELLS, LIMIT)
     if kept is not None:
         worth = _path_cost(kept, query, field) / (params.keep_ratio * grid.cell_m)
@@ -160,12 +160,21 @@ def _places(cells: list[int], query: Query) -> F64:
     row, column = np.divmod(cells, len(north))
     path = np.stack([north[row], east[column]], axis=1)
     path[0] = query.prefix_ne_m[-1]
-    if np.hypot(*(path[-1] - query.goal_ne_m)) < 1.5 * query.grid.cell_m:
+    if _arrives(path, query):
         path[-1] = query.goal_ne_m
     return path
 
 
-def _kept(query: Query, field: _Field, old: F64 | None) -> F64 | None:
+def _arrives(path: F64, query: Query) -> bool:
+    """Does the path lead to the goal, but for the last cell?"""
+    return math.dist(path[-1].tolist(), query.goal_ne_m.tolist()) < 1.5 * query.grid.cell_m
+
+
+def _on_map(grid: GridMap, point_ne_m: F64) -> bool:
+    return bool(cells_of(grid, point_ne_m[None, :])[1][0])
+
+
+def _kept(query: Query, field: _Field, old: F64 | None, params: ExpertParams) -> F64 | None:
     """What is left of the old path from the anchor on, if it is still open."""
     if old is None or len(old) < 2:
         return None
@@ -174,6 +183,8 @@ def _kept(query: Query, field: _Field, old: F64 | None) -> F64 | None:
     if np.hypot(*offset[nearest]) > 2 * query.grid.cell_m or nearest >= len(old) - 2:
         return None
     rest = np.concatenate([query.prefix_ne_m[-1][None], old[nearest + 1 :]])
+    if not _arrives(rest, query) and (length(rest) < params.length_m or _on_map(query.grid, query.goal_ne_m)):
+        return None  # it ended where the map once did, or where the goal could not be reached: look on
     costs = _sample(query.grid, field.cost, rest)
     return None if (costs >= BLOCKED).any() else rest
 
@@ -208,8 +219,7 @@ def _cut(path: F64, params: ExpertParams) -> F64:
     """At most five waypoints (k, 2) whose chords stay near the path."""
     for relax in CHORD_RELAX:
         waypoints = _chords(path, params.chord_m * relax, params.length_m)
-        length = float(np.hypot(*np.diff(np.concatenate([path[:1], waypoints]), axis=0).T).sum())
-        if length >= SHORTEST_USEFUL_M or len(waypoints) < WAYPOINTS:
+        if length(np.concatenate([path[:1], waypoints])) >= SHORTEST_USEFUL_M or len(waypoints) < WAYPOINTS:
             break
     return waypoints
 
@@ -233,10 +243,10 @@ def _leave_m(places: list[list[float]]) -> float:
     """How far a stretch of path leaves the chord between its ends."""
     (north, east), *between, (end_north, end_east) = places
     dn, de = end_north - north, end_east - east
-    length = math.hypot(dn, de)
-    if length < 1e-9:
+    chord_m = math.hypot(dn, de)
+    if chord_m < 1e-9:
         return math.inf
-    return max(abs((n - north) * de - (e - east) * dn) for n, e in between) / length
+    return max(abs((n - north) * de - (e - east) * dn) for n, e in between) / chord_m
 
 
 def _cell(grid: GridMap, point_ne_m: F64) -> int:
