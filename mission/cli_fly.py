@@ -16,7 +16,6 @@ from mission.cli_options import (
     Px4Bin,
     Seed,
     SignKey,
-    Speed,
     parse_firmware,
     parse_overrides,
     parse_speed,
@@ -26,6 +25,11 @@ from mission.cli_options import (
 from mission.errors import FlightError
 
 DEFAULT_MISSION = "trajectory2"
+DEFAULT_SPEED = {"embedded": "max", "px4": "1"}  # a real PX4 does not wait for the companion
+
+FlySpeed = Annotated[
+    str | None, typer.Option("--speed", help="Times real time, or 'max': unpaced. Default max; on a real PX4 1.")
+]
 
 World = Annotated[str | None, typer.Option(help="Fly in this world (a name or a YAML file) instead of the mission's.")]
 Policy = Annotated[str | None, typer.Option(help="Who proposes waypoints in RL mode, instead of the mission's.")]
@@ -37,7 +41,7 @@ MissionName = Annotated[str, typer.Argument(help="A mission's name, a YAML file,
 def fly(
     mission: MissionName = DEFAULT_MISSION,
     seed: Seed = 0,
-    speed: Speed = "max",
+    speed: FlySpeed = None,
     lockstep: Lockstep = False,
     world: World = None,
     policy: Policy = None,
@@ -61,8 +65,8 @@ def fly(
     from mission.runner import FlySettings, check_ports
     from mission.runner import fly as run
 
-    times, in_step = parse_speed(speed, lockstep)
     who, px4 = parse_firmware(firmware, px4_bin)
+    times, in_step = parse_speed(speed or DEFAULT_SPEED[who.value], lockstep)
     settings = FlySettings(times, in_step, instance, operator_url, who, px4, sign_key)
     plan = plan_flight(mission, seed, parse_overrides(params, param), world, policy, fault or ())
     if who.value == "px4":

@@ -61,13 +61,14 @@ def check_ports(instance: int, firmware: Firmware = Firmware.EMBEDDED) -> None:
     """Raise InputError naming the first port that somebody else holds."""
     if firmware is Firmware.PX4:
         _check_port(px4_firmware.tcp_port(instance), "PX4's simulator link", socket.SOCK_STREAM)
-        _check_port(px4_firmware.OPERATOR_PORT, "operator")
         ports = px4_firmware.udp_ports() | {COMPANION_PORT: "companion"}
     else:
         ports = {spec.local_port: f"vehicle's {spec.name} link" for spec in SPECS}
         ports |= {spec.remote_port: spec.name for spec in SPECS if spec.name != "gcs"}
     for port, user in ports.items():
         _check_port(port + instance, user)
+    if firmware is Firmware.PX4:
+        _check_port(px4_firmware.OPERATOR_PORT, "operator")  # the same for every instance
 
 
 def _check_port(port: int, user: str, kind: socket.SocketKind = socket.SOCK_DGRAM) -> None:
