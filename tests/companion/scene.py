@@ -11,7 +11,7 @@ from companion import navigator
 from companion.core.frames import quaternion
 from companion.core.inputs import Inputs
 from companion.core.task import Task
-from companion.core.types import F64, AutopilotStatus, LandedState, VehicleState
+from companion.core.types import AutopilotStatus, LandedState, VehicleState
 from companion.navigator import Memory, Params, Record
 from mission.flight_plan import FlightPlan, plan_flight
 from mission.simulate import fly_in_process

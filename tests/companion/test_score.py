@@ -1,5 +1,6 @@
 """S_fuzzy, weights, density and the sensitivity schedule against the equations."""
 
+import itertools
 import math
 
 import numpy as np
@@ -84,7 +85,7 @@ def test_sensitivity_stays_inside_its_declared_bounds_and_falls_with_density() -
     scales = [sensitivity(density, params) for density in np.linspace(0.0, 1.0, 50)]
     assert max(scales) == 1.0
     assert min(scales) == pytest.approx(params.scale_min)
-    assert all(a >= b for a, b in zip(scales, scales[1:], strict=False))
+    assert all(a >= b for a, b in itertools.pairwise(scales))
 
 
 def test_bearings_are_five_degrees_apart_from_the_nose_on() -> None:
