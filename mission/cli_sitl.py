@@ -33,6 +33,8 @@ WindOption = Annotated[tuple[float, float], typer.Option(help="Where the air mov
 Turbulence = Annotated[str, typer.Option(help="none, light, moderate or severe; needs wind to be felt.")]
 Out = Annotated[Path | None, typer.Option("--out", help="Folder for truth and MAVLink logs; default: no logs.")]
 
+Params = Annotated[Path | None, typer.Option("--params", help="File that keeps PX4 parameters over the end.")]
+
 
 def sitl(
     world: World = "open",
@@ -45,6 +47,7 @@ def sitl(
     turbulence: Turbulence = "none",
     fault: Faults = None,
     instance: Instance = 0,
+    params: Params = None,
     firmware: FirmwareName = "embedded",
     px4_bin: Px4Bin = None,
     sign_key: SignKey = None,
@@ -71,7 +74,14 @@ def sitl(
     )
     settings = FlySettings(times, in_step, instance)
     config = VehicleConfig(
-        place.seeded(seed), sim, settings.run_config, instance, log_dir=out, firmware=who, sign_key=sign_key
+        place.seeded(seed),
+        sim,
+        settings.run_config,
+        instance,
+        log_dir=out,
+        params_file=params,
+        firmware=who,
+        sign_key=sign_key,
     )
     if json:
         print_json(config.to_json())

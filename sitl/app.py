@@ -11,6 +11,7 @@ import json
 import platform
 import signal
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -21,7 +22,9 @@ from companion.core.keyring import KeyFileError, Keyring
 from companion.core.transport import TransportError
 from companion.core.types import F64
 from sitl import px4_app
+from sitl.flight_logs import FlightLogs
 from sitl.link import SPECS, Link, bind, open_links
+from sitl.param_file import ParamFile, ParamFileError, read_param_file
 from sitl.px4_bridge import Bridge
 from sitl.server import Server
 from sitl.simulation import Simulation
@@ -64,13 +67,35 @@ def _open(config: VehicleConfig, stack: ExitStack, say: Say) -> Server:
     bound = bind(config.instance, clock)
     for _, transport in bound:
         stack.callback(transport.close)
+    sim.set_parameter("MAV_SYS_ID", config.system_id)
+    param_file = _open_params(config, sim)
     truth = _open_truth(config, sim.spawn_ned_m, stack)
-    links = open_links(bound, config.system_id, config.log_dir, clock, keyring)
+    links = open_links(bound, config.system_id, config.log_dir, clock, keyring, lean=config.run.lockstep)
     for link in links:
         stack.callback(link.close)
     if config.log_dir is not None:
         stack.callback(_write_counts, links, config.log_dir / "links.json")
-    return Server(sim, links, config.run, clock, config.system_id, truth, say)
+    folder = config.log_dir or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="swiftnav-")))
+    logs = FlightLogs(folder)
+    stack.callback(logs.close)
+    return Server(sim, links, config.run, clock, config.system_id, truth, say, logs, param_file)
+
+
+def _open_params(config: VehicleConfig, sim: Simulation) -> ParamFile | None:
+    """Take the parameters of the file, and keep it up to date from now on. Raises ConfigError and OSError."""
+    if config.params_file is None:
+        return None
+    params = sim.autopilot.params
+    param_file = ParamFile(config.params_file, config.system_id, {name: params[name] for name in params.names()})
+    try:
+        for name, value in read_param_file(config.params_file, params).items():
+            sim.set_parameter(name, value)
+        param_file.save(params)
+    except (ParamFileError, ValueError) as error:
+        raise ConfigError(str(error)) from error
+    except OSError as error:
+        raise ConfigError(f"{config.params_file} cannot be written: {error.strerror or error}") from error
+    return param_file
 
 
 def _open_px4(config: VehicleConfig, stack: ExitStack, say: Say) -> Bridge:

@@ -12,7 +12,7 @@ from companion.core.signing import PX4_UNSIGNED
 from companion.core.tlog import TlogWriter
 from companion.core.transport import Transport, TransportError
 from companion.core.udp import udp_out
-from sitl.streams import GCS_HZ, NAVIGATION, ONBOARD_HZ, StreamSchedule
+from sitl.streams import GCS_HZ, LEAN_HZ, NAVIGATION, ONBOARD_HZ, StreamSchedule
 
 Message = Any  # a MAVLink_*_message object
 
@@ -43,13 +43,17 @@ SPECS: Final = (
 class Link:
     """One connection with its stream rates: ``wall`` by wall time, ``vehicle`` by vehicle time (companion only)."""
 
-    def __init__(self, spec: LinkSpec, connection: Connection, tlog: TlogWriter | None = None) -> None:
+    def __init__(
+        self, spec: LinkSpec, connection: Connection, tlog: TlogWriter | None = None, lean: bool = False
+    ) -> None:
+        """``lean``: only the streams that a flight needs."""
         self.name = spec.name
         self.companion = spec.companion
         self.connection = connection
         by_vehicle = NAVIGATION if spec.companion else frozenset[int]()
-        self.wall = StreamSchedule({i: hz for i, hz in spec.rates_hz.items() if i not in by_vehicle})
-        self.vehicle = StreamSchedule({i: hz for i, hz in spec.rates_hz.items() if i in by_vehicle})
+        rates_hz = {i: hz for i, hz in spec.rates_hz.items() if i in LEAN_HZ or not lean}
+        self.wall = StreamSchedule({i: hz for i, hz in rates_hz.items() if i not in by_vehicle})
+        self.vehicle = StreamSchedule({i: hz for i, hz in rates_hz.items() if i in by_vehicle})
         self._tlog = tlog
 
     def schedule_of(self, message_id: int) -> StreamSchedule:
@@ -88,6 +92,7 @@ def open_links(
     log_dir: Path | None,
     clock: Clock,
     keyring: Keyring | None = None,
+    lean: bool = False,
 ) -> list[Link]:
     """Links over bound ports, each with a log in ``log_dir``. Raises OSError when that cannot be written.
 
@@ -97,5 +102,6 @@ def open_links(
     for link_id, (spec, transport) in enumerate(bound):
         signing = keyring.link(link_id, PX4_UNSIGNED) if keyring is not None and spec.signs else None
         tlog = TlogWriter(log_dir / f"vehicle_{spec.name}.tlog") if log_dir is not None else None
-        links.append(Link(spec, Connection(transport, system_id, COMPONENT, tlog, clock, signing=signing), tlog))
+        connection = Connection(transport, system_id, COMPONENT, tlog, clock, signing=signing)
+        links.append(Link(spec, connection, tlog, lean))
     return links

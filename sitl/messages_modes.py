@@ -16,12 +16,13 @@ from sitl.extra_messages import RawMessage, protocol_version
 from sitl.messages import ORIGIN
 from sitl.modes import TITLES, FlightMode
 from sitl.simulation import Simulation
+from sitl.streams import CURRENT_MODE_ID
 
 Message = Any  # a MAVLink_*_message object
 
 IGNORE_RATES: Final = 7  # ATTITUDE_TARGET_TYPEMASK
 IGNORE_ATTITUDE: Final = 128
-CURRENT_MODE_ID, AVAILABLE_MODES_ID, PROTOCOL_VERSION_ID = 436, 435, 300
+AVAILABLE_MODES_ID, PROTOCOL_VERSION_ID = 435, 300
 _CURRENT_MODE = struct.Struct("<IIB")
 _AVAILABLE_MODE = struct.Struct("<IIBBB35s")
 ADVANCED: Final = 1  # MAV_MODE_PROPERTY

@@ -1,6 +1,7 @@
 """How are PX4's parameters read and written over MAVLink? Bytewise encoding: an INT32 is a float with the same bits."""
 
 import struct
+import zlib
 from typing import Any, Final
 
 from pymavlink.dialects.v20 import common as mav
@@ -10,6 +11,7 @@ from sitl.simulation import Simulation
 Message = Any  # a MAVLink_*_message object
 
 NO_INDEX: Final = 65535
+HASH_CHECK: Final = "_HASH_CHECK"  # one number for all values: a client that knows it need not ask for them
 
 
 def encode(value: int | float) -> tuple[float, int]:
@@ -28,7 +30,17 @@ def decode(param_value: float, param_type: int) -> int | float | None:
 
 def read_all(sim: Simulation) -> list[Message]:
     """PARAM_VALUE of everything, for PARAM_REQUEST_LIST."""
-    return [_value(sim, name) for name in sim.autopilot.params.names()]
+    return [hash_check(sim), *(_value(sim, name) for name in sim.autopilot.params.names())]
+
+
+def hash_check(sim: Simulation) -> Message:
+    """PARAM_VALUE of _HASH_CHECK: a checksum over all names and values."""
+    params = sim.autopilot.params
+    names, checksum = params.names(), 0
+    for name in names:
+        checksum = zlib.crc32(name.encode() + struct.pack("<f", encode(params[name])[0]), checksum)
+    value = struct.unpack("<f", struct.pack("<I", checksum))[0]
+    return mav.MAVLink_param_value_message(HASH_CHECK.encode(), value, mav.MAV_PARAM_TYPE_UINT32, len(names), NO_INDEX)
 
 
 def read(message: Message, sim: Simulation) -> list[Message]:
@@ -37,6 +49,8 @@ def read(message: Message, sim: Simulation) -> list[Message]:
     if message.param_index >= 0:
         return [_value(sim, names[message.param_index])] if message.param_index < len(names) else []
     name = param_name(message)
+    if name == HASH_CHECK:
+        return [hash_check(sim)]
     return [_value(sim, name)] if name in sim.autopilot.params else []
 
 

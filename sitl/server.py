@@ -15,9 +15,11 @@ from pymavlink.dialects.v20 import common as mav
 from companion.core.clock import Clock
 from companion.core.transport import wait_readable
 from sitl.answers import StatusText
+from sitl.flight_logs import FlightLogs
 from sitl.gates import GateKeeper
 from sitl.link import Link
 from sitl.pacer import Pacer
+from sitl.param_file import ParamFile
 from sitl.router import Router
 from sitl.simulation import STEP_MS, Simulation
 from sitl.truth_log import TruthFile
@@ -50,16 +52,21 @@ class Server:
         system_id: int = 1,
         truth: TruthFile | None = None,
         say: Callable[[str], None] = lambda _text: None,
+        logs: FlightLogs | None = None,
+        param_file: ParamFile | None = None,
     ) -> None:
         self.sim = sim
+        sim.boot_unix_us = clock.wall_us()
         self.lockstep = config.lockstep
         self._config = config
         self._links = list(links)
         self._transports = [link.connection.transport for link in links]
         self._clock = clock
         self._truth = truth
+        self._logs = logs
+        self._param_file = param_file
         self._voice = Voice(sim, links, say)
-        self._router = Router(sim, system_id, lambda: clock.wall_us() * 1000)
+        self._router = Router(sim, system_id, logs)
         self._gates = GateKeeper(companion=config.lockstep) if config.gates else None
         self._pacer = Pacer(config.speed, STEP_MS / 1e3)
         self._ahead: ScanBundle | None = None  # taken already, to be delivered after the answer to the one before
@@ -79,9 +86,11 @@ class Server:
                 self._paced_slice()
 
     def flush(self) -> None:
-        """Bring the logs to the disk."""
+        """Bring logs and parameters to the disk."""
         for link in self._links:
             link.flush()
+        if self._param_file is not None:
+            self._param_file.save(self.sim.autopilot.params)
         if self._truth is not None:
             self._truth.flush()
 
@@ -163,6 +172,8 @@ class Server:
             self._voice.stream_by_vehicle()
 
     def _log_truth(self) -> None:
+        if self._logs is not None:
+            self._logs.tick(self.sim)
         if self._truth is not None:
             self._truth.write(self.sim.rows)
         self.sim.rows.clear()

@@ -38,6 +38,7 @@ class VehicleConfig:
     system_id: int = 1
     log_dir: Path | None = None
     firmware: Firmware = Firmware.EMBEDDED
+    params_file: Path | None = None  # PX4 parameters, read at the start and kept up to date
     sign_key: Path | None = None  # file of the key for the links of companion and ground station; None: unsigned
 
     def to_json(self) -> dict[str, Any]:
@@ -54,6 +55,7 @@ class VehicleConfig:
             "system_id": self.system_id,
             "log_dir": str(self.log_dir) if self.log_dir is not None else None,
             "firmware": self.firmware.value,
+            "params_file": str(self.params_file) if self.params_file is not None else None,
             "sign_key": str(self.sign_key) if self.sign_key is not None else None,
         }
 
@@ -70,6 +72,7 @@ def from_json(data: dict[str, Any]) -> VehicleConfig:
             system_id=int(data.get("system_id", 1)),
             log_dir=Path(data["log_dir"]) if data.get("log_dir") else None,
             firmware=Firmware(data.get("firmware", Firmware.EMBEDDED)),
+            params_file=Path(data["params_file"]) if data.get("params_file") else None,
             sign_key=Path(data["sign_key"]) if data.get("sign_key") else None,
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:

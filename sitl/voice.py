@@ -15,6 +15,7 @@ from sitl.streams import NAVIGATION
 Message = Any  # a MAVLink_*_message object
 
 READY_NEWS: Final = (mav.MAVLINK_MSG_ID_SYS_STATUS, mav.MAVLINK_MSG_ID_HOME_POSITION)
+DATAGRAM_MESSAGES: Final = 8  # at most 2048 bytes, which is what MAVSDK reads of a datagram
 SCAN: Final = mav.MAVLINK_MSG_ID_OBSTACLE_DISTANCE  # to the companion with every scan, not by the schedule
 
 
@@ -71,9 +72,10 @@ class Voice:
         if told != self._told:
             self._told = told
             self._to_all(messages.heartbeat(self._sim), messages.extended_sys_state(self._sim))
-        if ap.ready and not self._told_ready:
-            self._told_ready = True
-            self._to_all(*(BUILDERS[message_id](self._sim) for message_id in READY_NEWS))
+        if ap.ready is not self._told_ready:
+            self._told_ready = ap.ready
+            news = (BUILDERS[message_id](self._sim) for message_id in READY_NEWS)
+            self._to_all(*(message for message in news if message is not None))
         texts, ap.texts[:] = list(ap.texts), []
         for text in texts:
             self._texts = self._texts % 0xFFFF + 1
@@ -87,5 +89,5 @@ class Voice:
     def _send(self, link: Link, message_ids: list[int]) -> None:
         built = (BUILDERS[i](self._sim) for i in message_ids if not (link.companion and i == SCAN))
         present = [message for message in built if message is not None]
-        if present:
-            link.connection.send(*present)
+        for at in range(0, len(present), DATAGRAM_MESSAGES):
+            link.connection.send(*present[at : at + DATAGRAM_MESSAGES])

@@ -20,7 +20,7 @@ from sitl.world import World
 
 EMPTY = World("empty", np.zeros(2), np.array([5.0, 0.0]), (-9, -9, 9, 9), np.zeros((0, 4)), np.zeros((0, 6)))
 # What changes the control loops to nonsense is the user's own doing, as with PX4.
-HANDLED = sorted(set(Router(Simulation(EMPTY), 1, lambda: 0)._handlers) - {mav.MAVLINK_MSG_ID_PARAM_SET})
+HANDLED = sorted(set(Router(Simulation(EMPTY), 1).handlers) - {mav.MAVLINK_MSG_ID_PARAM_SET})
 COMMANDS = [400, 176, 22, 21, 20, 512, 511, 510, 519, 520, 410, 192, 16, 31000]
 
 
@@ -32,7 +32,7 @@ class Bench:
         self.link = Link(SPECS[0], Connection(ours, 1, 1))
         self.client = Connection(theirs, 245, 190)
         self.sim = Simulation(EMPTY)
-        self.router = Router(self.sim, 1, lambda: 5)
+        self.router = Router(self.sim, 1)
         self.sim.autopilot.command_arm(force=True)
         self.sim.autopilot.command_takeoff()
         while self.sim.autopilot.mode is not FlightMode.HOLD:
