@@ -127,12 +127,16 @@ class Server:
         deadline_s = self._clock.now_s() + ANSWER_WALL_S
         if self.sim.runs_ahead and not self._stands():
             self._ahead = self._next_scan()
-        while self._router.answered_ms < scan.t_ms and not self.sim.finished and not stopped():
+        while self._router.answered_ms < scan.t_ms and not self._is_last() and not stopped():
             left_s = deadline_s - self._clock.now_s()
             if left_s <= 0.0:
                 self._leave_lockstep()
                 return
             self._serve(min(left_s, POLL_WALL_S))
+
+    def _is_last(self) -> bool:
+        """Is there nothing to follow the scan that was delivered? The one before the last is still answered."""
+        return self.sim.finished and self._ahead is None
 
     def _next_scan(self) -> ScanBundle:
         self.sim.advance_to_scan()
