@@ -265,7 +265,7 @@ class MissionFlight:
         speed_m_s = self._speed_m_s or float(self._params["MPC_XY_CRUISE"])
         return Pace(
             speed_m_s,
-            float(self._params["MPC_Z_V_AUTO_UP"]),
+            float(self._params["MPC_TKO_SPEED" if self._work is Work.CLIMB else "MPC_Z_V_AUTO_UP"]),
             float(self._params["MPC_Z_V_AUTO_DN"]),
             self._passing_m_s(),
         )
