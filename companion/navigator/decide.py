@@ -65,18 +65,19 @@ def decide(
     memory = replace(memory, policy=remembered, decisions=memory.decisions + 1)
     engaged = replace(engaged, tried_t_s=state.t_s)
     waypoints = None if proposal is None else proposal.waypoints_ne_m
-    verdict = check(
-        CheckQuery(
-            start_ned_m=prefix[0],
-            start_vel_ned_m_s=state.vel_ned_m_s[:2],
-            goal_ned_m=task.goal_ned_m,
-            radius_m=params.vehicle.radius_m,
-            points_ned_m=percept.points_ne_m,
-            proposal_ned_m=waypoints,
-            escape_ned_m=_escape(state.pos_ned_m[:2], task.goal_ned_m, percept, params),
-        ),
-        params.checker,
+    asked = CheckQuery(
+        start_ned_m=prefix[0],
+        start_vel_ned_m_s=state.vel_ned_m_s[:2],
+        goal_ned_m=task.goal_ned_m,
+        radius_m=params.vehicle.radius_m,
+        points_ned_m=percept.points_ne_m,
+        proposal_ned_m=waypoints,
+        escape_ned_m=None,
     )
+    verdict = check(asked, params.checker)
+    if verdict.path_ned_m is None:
+        escape = _escape(state.pos_ned_m[:2], task.goal_ned_m, percept, params)
+        verdict = check(replace(asked, escape_ned_m=escape), params.checker)
     path = None
     if verdict.path_ned_m is not None and verdict.margin_m is not None:
         path = Path(verdict.path_ned_m, 0.0, verdict.margin_m, state.t_s)
