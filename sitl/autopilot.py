@@ -11,15 +11,11 @@ from typing import Final
 from companion.core.types import LandedState, VehicleState
 from sitl.answers import ACCEPTED, CRITICAL, INFO, CommandResult, Result, StatusText
 from sitl.demand import IDLE, Demand, OffboardSetpoint
-from sitl.failsafe import FAILSAFES, Facts, Failsafe
-from sitl.geo import Origin
-from sitl.guardian import Guardian
+from sitl.failsafe import Facts, Failsafe
 from sitl.home import Home, here
 from sitl.land_detector import LandDetector
-from sitl.mission_flight import Ending, MissionFlight
-from sitl.mission_items import MissionType
-from sitl.mission_store import MissionStore
 from sitl.modes import ARMABLE, AUTONOMOUS, FLYABLE, MANUAL, TITLES, FlightMode
+from sitl.navigator import Navigator
 from sitl.offboard_stream import OffboardStream
 from sitl.pilot import Sticks
 from sitl.px4_params import ParamStore
@@ -39,7 +35,6 @@ class Autopilot:
         self.user_mode = FlightMode.HOLD  # what was asked for; ``mode`` is what is flown
         self.failsafe: Failsafe | None = None
         self.has_flown = False
-        self.armed_time_s = 0.0  # summed up
         self.demand: Demand = IDLE
         self.home: Home | None = None  # None until the position is known
         self.texts: list[StatusText] = []
@@ -53,10 +48,9 @@ class Autopilot:
         self._landed_s = math.inf  # since when armed and landed
         self._stream = OffboardStream(self.params)
         self._mode_chosen = False  # by a person, since the last update
-        self.plans = MissionStore(self._plan_changed)
-        self.mission = MissionFlight(self.plans, self.params, lambda: self.steering.home, self.texts.append)
-        self.guardian = Guardian(self.plans, self.params, lambda: self.steering.home, self.texts.append)
-        self.steering.mission, self.steering.say = self.mission, self.texts.append
+        self._navigator = Navigator(self.params, self.steering, self.texts.append)
+        self.plans, self.mission = self._navigator.plans, self._navigator.mission
+        self.guardian = self._navigator.guardian
 
     # --- what others see --------------------------------------------------------------------------------------
 
@@ -100,10 +94,6 @@ class Autopilot:
         returns = self.mode is FlightMode.RTL and self.steering.landing
         coming_down = returns or (self.mode is FlightMode.MISSION and self.mission.landing)
         return LandedState.LANDING if self.mode is FlightMode.LAND or coming_down else LandedState.IN_AIR
-
-    def offboard_available(self, t_s: float) -> bool:
-        """Is the setpoint stream fresh enough for OFFBOARD at ``t_s``?"""
-        return self._stream.fresh(t_s)
 
     # --- what arrives -----------------------------------------------------------------------------------------
 
@@ -186,7 +176,6 @@ class Autopilot:
 
     def update(self, state: VehicleState, contact: bool) -> None:
         """One control tick; ``contact``: any part touches the ground."""
-        self.armed_time_s += state.t_s - self.t_s if self.armed else 0.0
         self._state = state
         if not self._ready_said and self.ready:
             self._ready_said = True
@@ -230,9 +219,7 @@ class Autopilot:
         chosen, self._mode_chosen = self._mode_chosen, False
         armed_for_s = self.t_s - self.armed_s
         facts = Facts(self.t_s, self.armed, self.user_mode, armed_for_s, chosen, lost, not (blind or by_stream))
-        failsafe = FAILSAFES.get(self.guardian.judge(state, facts))
-        if failsafe is not None and failsafe.mode in MANUAL and self.steering.pilot.present(self.t_s):
-            failsafe = Failsafe(failsafe.mode, BEHAVIOURS[failsafe.mode])
+        failsafe = self._navigator.failsafe(state, self.landed, facts)
         if failsafe == self.failsafe or not self.armed:
             return
         self.failsafe = failsafe
@@ -241,31 +228,11 @@ class Autopilot:
             self._disarm("Disarmed by failsafe")
 
     def _fly_mission(self, state: VehicleState) -> None:
-        mission = self.mission
-        if self._behaviour() is not Behaviour.MISSION:
-            if mission.active:
-                mission.stop()
-            return
-        if not mission.active:
-            mission.start(self._flyable(FlightMode.MISSION), self.landed)
-        mission.update(state, self.landed)
-        if mission.ending is Ending.RETURN:
-            self._change_mode(FlightMode.RTL)
-        elif mission.ending is Ending.HOLD:
-            self._change_mode(FlightMode.HOLD)
-            self.steering.adopt(mission.settle())
-
-    def _plan_changed(self, kind: MissionType) -> None:
-        """A new mission, fence or list of rally points has come."""
-        if kind is not MissionType.MISSION:
-            in_air = self._state.pos_ned_m if self._state is not None and not self.landed else None
-            self.guardian.load(kind, in_air, Origin())
-            self.steering.safe_points_ned_m = self.guardian.safe_points_ned_m
-            return
-        self.mission.load()
-        why = self.mission.objection(self.landed, self.guardian.fence)
-        if why is not None:
-            self._say(CRITICAL, why)
+        ends_in = self._navigator.fly(self._behaviour() is Behaviour.MISSION, state, self.landed)
+        if ends_in is not None:
+            self._change_mode(ends_in)
+        if ends_in is FlightMode.HOLD:
+            self.steering.adopt(self.mission.settle())
 
     def _watch_sticks(self) -> None:
         if self.mode not in MANUAL or self.user_mode not in MANUAL or self.steering.pilot.present(self.t_s):
@@ -302,8 +269,8 @@ class Autopilot:
         if mode in MANUAL:
             return self.steering.pilot.present(self.t_s)
         if mode is FlightMode.MISSION:
-            return bool(self.plans.mission) and self.mission.objection(self.landed, self.guardian.fence) is None
-        return mode in FLYABLE and (mode is not FlightMode.OFFBOARD or self.offboard_available(self.t_s))
+            return self._navigator.mission_flyable()
+        return mode in FLYABLE and (mode is not FlightMode.OFFBOARD or self._stream.fresh(self.t_s))
 
     def _choose_mode(self, mode: FlightMode) -> None:
         """A person wants this mode."""
