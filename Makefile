@@ -72,6 +72,7 @@ tables: $(VENV)/.sitl
 
 docs: $(VENV)/.sitl
 	$(BIN)/swiftnav params docs > docs/parameters.md
+	$(BIN)/python -m sitl.contract > docs/mavlink.md
 
 bench: $(VENV)/.sitl
 	$(BIN)/swiftnav bench speed

@@ -24,7 +24,7 @@ ANYBODY: Final = frozenset({mav.MAV_CMD_REQUEST_PROTOCOL_VERSION, mav.MAV_CMD_RE
 
 def execute(command: Command, sim: Simulation, link: Link) -> Answer:
     """Carry out a command that came over ``link``."""
-    handler = _HANDLERS.get(command.id)
+    handler = HANDLERS.get(command.id)
     return handler(command, sim, link) if handler is not None else UNSUPPORTED
 
 
@@ -39,6 +39,7 @@ def request_message(message_id: int, sim: Simulation, index: float = math.nan) -
 
 
 def _arm(command: Command, sim: Simulation, _link: Link) -> Answer:
+    """Arm (p1 = 1) or disarm (0); p2 = 21196 does it always. Refused with a text when not ready, or in flight."""
     arm, force = command.params[0], command.params[1] == FORCE
     if arm == 1.0:
         return answer(sim.autopilot.command_arm(force))
@@ -48,6 +49,7 @@ def _arm(command: Command, sim: Simulation, _link: Link) -> Answer:
 
 
 def _set_mode(command: Command, sim: Simulation, _link: Link) -> Answer:
+    """Change to a PX4 mode (p2 main, p3 sub): one honest answer; refused in flight when the mode cannot be flown."""
     flags, main, sub = (whole(p) for p in command.params[:3])
     if flags is None or main is None or not flags & mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
         return REJECTED
@@ -55,25 +57,30 @@ def _set_mode(command: Command, sim: Simulation, _link: Link) -> Answer:
 
 
 def _takeoff(command: Command, sim: Simulation, _link: Link) -> Answer:
+    """Take off to p7 above sea level; NaN: MIS_TAKEOFF_ALT above here. Legal before arming."""
     alt_amsl_m = command.params[6]
     down_m = ORIGIN.down_m(alt_amsl_m) if math.isfinite(alt_amsl_m) else None
     return answer(sim.autopilot.command_takeoff(down_m))
 
 
 def _land(_command: Command, sim: Simulation, _link: Link) -> Answer:
+    """Land here."""
     return answer(sim.autopilot.command_land())
 
 
 def _return(_command: Command, sim: Simulation, _link: Link) -> Answer:
+    """Return to home and land."""
     return answer(sim.autopilot.command_mode(modes.FlightMode.RTL))
 
 
 def _request_message(command: Command, sim: Simulation, _link: Link) -> Answer:
+    """Send message p1 once; DENIED when it is unknown or not there yet. AVAILABLE_MODES: p2 is the index, 0 for all."""
     message_id = whole(command.params[0])
     return request_message(message_id, sim, command.params[1]) if message_id is not None else DENIED
 
 
 def _set_interval(command: Command, _sim: Simulation, link: Link) -> Answer:
+    """Stream message p1 every p2 microseconds on this link; 0: default, -1: off. FAILED for unknown ones."""
     message_id, interval_us = whole(command.params[0]), whole(command.params[1])
     extras = (command.params[2], command.params[3], command.params[6])
     if any(math.isfinite(p) and p != 0.0 for p in extras) or message_id is None or interval_us is None:
@@ -85,6 +92,7 @@ def _set_interval(command: Command, _sim: Simulation, link: Link) -> Answer:
 
 
 def _get_interval(command: Command, _sim: Simulation, link: Link) -> Answer:
+    """MESSAGE_INTERVAL of message p1 on this link."""
     message_id = whole(command.params[0])
     if message_id is None or not 0 <= message_id <= 0xFFFF:
         return FAILED
@@ -94,22 +102,26 @@ def _get_interval(command: Command, _sim: Simulation, link: Link) -> Answer:
 
 
 def _version(command: Command, sim: Simulation, _link: Link) -> Answer:
+    """AUTOPILOT_VERSION; broadcasts are answered too."""
     return request_message(mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION, sim)
 
 
 def _protocol(command: Command, sim: Simulation, _link: Link) -> Answer:
+    """PROTOCOL_VERSION; broadcasts are answered too."""
     return request_message(PROTOCOL_VERSION_ID, sim)
 
 
 def _flight_information(command: Command, sim: Simulation, _link: Link) -> Answer:
+    """FLIGHT_INFORMATION."""
     return request_message(mav.MAVLINK_MSG_ID_FLIGHT_INFORMATION, sim)
 
 
 def _home(command: Command, sim: Simulation, _link: Link) -> Answer:
+    """HOME_POSITION."""
     return request_message(mav.MAVLINK_MSG_ID_HOME_POSITION, sim)
 
 
-_HANDLERS: Final[Mapping[int, Handler]] = {
+HANDLERS: Final[Mapping[int, Handler]] = {
     mav.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
     mav.MAV_CMD_DO_SET_MODE: _set_mode,
     mav.MAV_CMD_NAV_TAKEOFF: _takeoff,
