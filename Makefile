@@ -11,7 +11,7 @@ FIND_PYTHON = python=; for p in $(PYTHON) python3.11 python3.12 python3; do \
 	&& python=$$p && break; done
 DEBIAN_PACKAGES := python3 python3-venv
 
-.PHONY: help setup fly test slow tables check format docs bench image clean
+.PHONY: help setup fly test slow tables check format docs bench images clean
 help:
 	@echo "make fly     set up and fly trajectory 2; ARGS='trajectory1 --seed 3 --speed 1' for another flight"
 	@echo "make test    set up, check and test: everything CI runs"
@@ -22,7 +22,7 @@ help:
 	@echo "make slow    the long flight tests"
 	@echo "make tables  flights over many seeds, judged: the results in README.md"
 	@echo "make bench   speed as ratios to bare JSBSim"
-	@echo "make image   container of the companion (needs docker)"
+	@echo "make images  build the container images and try them out (docker or podman; as root buildah)"
 	@echo "make clean   remove .venv and caches"
 
 $(BIN)/python:
@@ -77,8 +77,8 @@ docs: $(VENV)/.sitl
 bench: $(VENV)/.sitl
 	$(BIN)/swiftnav bench speed
 
-image:
-	docker build -f docker/companion.Dockerfile -t swiftnav-companion .
+images: $(VENV)/.sitl
+	PYTHON=$(BIN)/python sh docker/images.sh
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

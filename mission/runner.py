@@ -44,6 +44,7 @@ class FlySettings:
     firmware: Firmware = Firmware.EMBEDDED
     px4: Px4Build | None = None  # with firmware PX4: started here; None: somebody else starts one
     sign_key: Path | None = None  # of the companion's and the ground station's link
+    companion_program: tuple[str, ...] = ()  # that takes the companion's arguments; empty: ``python -m companion``
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready."""
@@ -114,9 +115,7 @@ async def _fly(
 ) -> None:
     """Both processes and the operator, until the operator is done or something ends before its time."""
     _end_on_sigterm_too()
-    companion = children.start(
-        "companion", "companion", companion_arguments(plan, settings, folder), folder / "companion.log"
-    )
+    companion = _start_companion(plan, settings, folder, children)
     firmware = _start_firmware(settings, folder, children)
     vehicle = children.start("vehicle", "sitl", [str(_write_vehicle(plan, settings, folder))], folder / "vehicle.log")
     config = operator.OperatorConfig(_operator_url(settings), plan.mission.success.time_limit_s)
@@ -132,6 +131,13 @@ async def _fly(
         await asyncio.gather(flight, return_exceptions=True)
     await asyncio.to_thread(wait_for_end, companion, AFTERWARDS_WALL_S)
     console.refresh()
+
+
+def _start_companion(plan: FlightPlan, settings: FlySettings, folder: Path, children: Children) -> Child:
+    arguments, log = companion_arguments(plan, settings, folder), folder / "companion.log"
+    if settings.companion_program:
+        return children.start_program("companion", [*settings.companion_program, *arguments], log, {})
+    return children.start("companion", "companion", arguments, log)
 
 
 def _start_firmware(settings: FlySettings, folder: Path, children: Children) -> list[Child]:

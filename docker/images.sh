@@ -1,0 +1,123 @@
+#!/bin/sh
+# Builds every image and tries it out: `make images`. With docker or podman where one runs; otherwise, as root on a
+# Debian, with buildah on a base made by debootstrap: apt-get install buildah debootstrap.
+# PYTHON: an interpreter with swiftnav[sitl], for the vehicle that the companion's image flies.
+set -eu
+cd "$(dirname "$0")/.."
+PYTHON=${PYTHON:-.venv/bin/python}
+WORK=$PWD/build/images
+BASE=debian:bookworm-slim
+COMPANION_MAX_MB=400
+mkdir -p "$WORK"
+
+say() { printf '\n== %s\n' "$*"; }
+
+choose_engine() {
+    for engine in docker podman; do
+        if $engine info >/dev/null 2>&1; then
+            ENGINE=$engine
+            return
+        fi
+    done
+    if [ "$(id -u)" = 0 ] && command -v buildah >/dev/null && command -v debootstrap >/dev/null; then
+        ENGINE=buildah
+        export BUILDAH_ISOLATION=chroot STORAGE_DRIVER=vfs
+        make_base
+        return
+    fi
+    echo "make images: no docker or podman runs here; as root, 'apt-get install buildah debootstrap' will do" >&2
+    exit 1
+}
+
+b() { buildah --root "$WORK/store" --runroot "$WORK/run" "$@"; }
+
+# A Debian as small as the slim image, that trusts whom this machine trusts (a registry mirror's certificate, say).
+make_base() {
+    BASE=localhost/debian:bookworm
+    if b images -q "$BASE" >/dev/null 2>&1; then return; fi
+    say "base: Debian 12 by debootstrap"
+    rm -rf "$WORK/base"
+    debootstrap --variant=minbase --include=ca-certificates bookworm "$WORK/base" \
+        "${DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$WORK/debootstrap.log"
+    cp /etc/ssl/certs/ca-certificates.crt "$WORK/base/etc/ssl/certs/"
+    chroot "$WORK/base" apt-get clean
+    for left_over in var/lib/apt/lists usr/share/doc usr/share/man usr/share/locale usr/share/info; do
+        find "$WORK/base/$left_over" -mindepth 1 -delete
+    done
+    container=$(b from scratch)
+    b add -q "$container" "$WORK/base" / >/dev/null
+    b commit -q "$container" "$BASE" >/dev/null
+    b rm "$container" >/dev/null
+    rm -rf "$WORK/base"
+}
+
+build() {
+    say "build swiftnav-$1"
+    if [ "$ENGINE" = buildah ]; then
+        b bud -q --format docker --build-arg BASE="$BASE" -f "docker/$1.Dockerfile" -t "swiftnav-$1" .
+    else
+        "$ENGINE" build -q -f "docker/$1.Dockerfile" -t "swiftnav-$1" .
+    fi
+}
+
+# run IMAGE FOLDER ENTRYPOINT ARGUMENTS...: what the image starts, with FOLDER of this machine under the same name.
+run() {
+    image=$1 folder=$2
+    shift 2
+    if [ "$ENGINE" = buildah ]; then
+        b run -v "$folder:$folder" "$(container_of "$image")" -- "$@"
+    else
+        shift # the entry point is the image's own
+        "$ENGINE" run --rm --network host -v "$folder:$folder" "swiftnav-$image" "$@"
+    fi
+}
+
+container_of() {
+    b from --name "try-$1" --pull-never "localhost/swiftnav-$1:latest" 2>/dev/null || echo "try-$1"
+}
+
+size_mb() {
+    if [ "$ENGINE" = buildah ]; then
+        du -sm "$(b mount "$(container_of "$1")")" | cut -f1
+    else
+        echo $(($("$ENGINE" image inspect --format '{{.Size}}' "swiftnav-$1") / 1000000))
+    fi
+}
+
+try_companion() {
+    say "companion: nothing of the simulator, unprivileged, under $COMPANION_MAX_MB MB"
+    size=$(size_mb companion)
+    echo "$size MB"
+    [ "$size" -lt "$COMPANION_MAX_MB" ]
+    say "companion: --check without a vehicle must say so, with exit code 6"
+    code=0
+    run companion "$WORK" python -m companion --check --check-time 1 --vehicle udpin://127.0.0.1:14599 || code=$?
+    [ "$code" = 6 ]
+    say "companion: flies trajectory1 against a vehicle outside it"
+    rm -rf "$WORK/flight"
+    if [ "$ENGINE" = buildah ]; then
+        "$PYTHON" docker/fly_with.py "$WORK/flight" buildah --root "$WORK/store" --runroot "$WORK/run" \
+            run -v "$WORK:$WORK" "$(container_of companion)" -- python -m companion
+    else
+        "$PYTHON" docker/fly_with.py "$WORK/flight" \
+            "$ENGINE" run --rm --network host -v "$WORK:$WORK" swiftnav-companion
+    fi
+}
+
+try_others() {
+    say "sitl: flies trajectory1 by itself"
+    run sitl "$WORK" swiftnav fly trajectory1 --out /data/flights/try
+    say "relay: has what it starts"
+    if [ "$ENGINE" = buildah ]; then
+        run relay "$WORK" socat -V | head -2
+    else
+        "$ENGINE" run --rm --entrypoint socat swiftnav-relay -V | head -2
+    fi
+}
+
+choose_engine
+say "with $ENGINE"
+for image in companion sitl relay; do build "$image"; done
+try_companion
+try_others
+say "all images are built and have run"
