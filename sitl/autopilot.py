@@ -11,7 +11,7 @@ from typing import Final
 from companion.core.types import LandedState, VehicleState
 from sitl.answers import ACCEPTED, CRITICAL, INFO, CommandResult, Result, StatusText
 from sitl.demand import IDLE, Demand, OffboardSetpoint
-from sitl.failsafe import Facts, Failsafe
+from sitl.failsafe import Facts, Failsafe, without_sticks
 from sitl.home import Home, here
 from sitl.land_detector import LandDetector
 from sitl.modes import ARMABLE, AUTONOMOUS, FLYABLE, MANUAL, TITLES, FlightMode
@@ -22,8 +22,6 @@ from sitl.px4_params import ParamStore
 from sitl.steering import BEHAVIOURS, Behaviour, Steering
 
 READY_S: Final = 2.5  # PX4 v1.16 SIH: prearm checks pass two to three seconds after boot
-
-_STICKS_LOST: Final = {1: FlightMode.HOLD, 3: FlightMode.LAND, 5: FlightMode.TERMINATION}  # NAV_RCL_ACT; else Return
 
 
 class Autopilot:
@@ -42,15 +40,13 @@ class Autopilot:
         self._detector = LandDetector()
         self.steering = Steering(self.params)
         self._ready_said = False
-        self.armed_s = math.inf  # vehicle time of the last arming
-        self.takeoff_s = math.inf
-        self.flights = 0
+        self.armed_s = self.takeoff_s = math.inf  # vehicle time of the last arming and take-off
         self._landed_s = math.inf  # since when armed and landed
+        self.flights = 0
         self._stream = OffboardStream(self.params)
         self._mode_chosen = False  # by a person, since the last update
-        self._navigator = Navigator(self.params, self.steering, self.texts.append)
-        self.plans, self.mission = self._navigator.plans, self._navigator.mission
-        self.guardian = self._navigator.guardian
+        nav = self._navigator = Navigator(self.params, self.steering, self.texts.append)
+        self.plans, self.mission, self.guardian = nav.plans, nav.mission, nav.guardian
 
     # --- what others see --------------------------------------------------------------------------------------
 
@@ -239,7 +235,7 @@ class Autopilot:
             return
         self._say(CRITICAL, "Manual control lost")
         self._say(CRITICAL, "Failsafe activated")
-        self._change_mode(_STICKS_LOST.get(int(self.params["NAV_RCL_ACT"]), FlightMode.RTL))
+        self._change_mode(without_sticks(self.params))
 
     def _watch_disarm(self) -> None:
         if not (self.armed and self.landed):

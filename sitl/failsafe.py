@@ -152,6 +152,12 @@ _BATTERY_CAUSES: Final = {
 }
 
 
+def without_sticks(params: ParamStore) -> FlightMode:
+    """The mode that follows a mode that wants sticks when they are lost (NAV_RCL_ACT)."""
+    modes = {1: FlightMode.HOLD, 3: FlightMode.LAND, 5: FlightMode.TERMINATION}
+    return modes.get(int(params["NAV_RCL_ACT"]), FlightMode.RTL)
+
+
 def responses(facts: Facts, params: ParamStore) -> Mapping[Cause, Response]:
     """Everything that is wrong now and what it asks for."""
     found: dict[Cause, Response] = {}

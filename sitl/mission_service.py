@@ -72,7 +72,7 @@ class MissionService:
             self._repeats += 0 if fresh else 1
             news.append(mission_messages.reached(reached))
         self._told = told
-        self._due_s = now_s + PERIOD_S if due else self._due_s
+        self._due_s = max(self._due_s + PERIOD_S, now_s) if due else self._due_s
         return news
 
 
