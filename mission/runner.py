@@ -152,7 +152,7 @@ def _operator_url(settings: FlySettings) -> str:
         return settings.operator_url
     if settings.firmware is Firmware.PX4:
         return px4_firmware.operator_url()
-    return f"udpin://0.0.0.0:{OPERATOR_PORT + settings.instance}"
+    return f"udpin://{HOST}:{OPERATOR_PORT + settings.instance}"
 
 
 def companion_arguments(plan: FlightPlan, settings: FlySettings, folder: Path) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Any, Final
 from companion.core.clock import Clock
 from companion.core.keyring import Keyring
 from companion.core.mavlink import Connection
-from companion.core.signing import PX4_UNSIGNED
+from companion.core.signing import COMPANION_UNSIGNED, PX4_UNSIGNED
 from companion.core.tlog import TlogWriter
 from companion.core.transport import Transport, TransportError
 from companion.core.udp import udp_out
@@ -96,11 +96,13 @@ def open_links(
 ) -> list[Link]:
     """Links over bound ports, each with a log in ``log_dir``. Raises OSError when that cannot be written.
 
-    With ``keyring`` all sign that can; link ids are PX4's instance numbers.
+    With ``keyring`` all sign that can; link ids are PX4's instance numbers. A companion is found by a signed HEARTBEAT
+    only (in lockstep the vehicle's clock waits for it), a ground station as PX4 has it.
     """
     links = []
     for link_id, (spec, transport) in enumerate(bound):
-        signing = keyring.link(link_id, PX4_UNSIGNED) if keyring is not None and spec.signs else None
+        unsigned = COMPANION_UNSIGNED if spec.companion else PX4_UNSIGNED
+        signing = keyring.link(link_id, unsigned) if keyring is not None and spec.signs else None
         tlog = TlogWriter(log_dir / f"vehicle_{spec.name}.tlog") if log_dir is not None else None
         connection = Connection(transport, system_id, COMPONENT, tlog, clock, signing=signing)
         links.append(Link(spec, connection, tlog, lean))

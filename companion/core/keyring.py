@@ -59,10 +59,11 @@ class Keyring:
 
     def _save(self, clean: bool) -> None:
         streams = [[*stream, timestamp] for stream, timestamp in self.book.streams.items()]
-        text = json.dumps({"timestamp": self.book.timestamp, "streams": streams, "clean": clean})
+        heard_as = [[*place, link_id] for place, link_id in self.book.heard_as.items()]
+        kept = {"timestamp": self.book.timestamp, "streams": streams, "heard_as": heard_as, "clean": clean}
         beside = self._path.with_name(f"{self._path.name}.{os.getpid()}")
         try:
-            beside.write_text(text + "\n", encoding="utf-8")
+            beside.write_text(json.dumps(kept) + "\n", encoding="utf-8")
             beside.replace(self._path)
         finally:
             beside.unlink(missing_ok=True)
@@ -85,7 +86,7 @@ class LinkSigning:
 
     def judge(self, packet: bytes) -> Verdict:
         """Judge one whole packet that arrived."""
-        return judge(packet, self._ring.key, self._ring.book, self._now())
+        return judge(packet, self._ring.key, self._ring.book, self._now(), self._link_id)
 
     def tend(self) -> None:
         """Keep the timestamps when it is time to."""
@@ -125,7 +126,8 @@ def _load(path: Path, now: int) -> Book:
         data = json.loads(path.read_text(encoding="utf-8"))
         clean = bool(data["clean"])
         streams = {(int(link), int(system), int(part)): int(last) for link, system, part, last in data["streams"]}
-        book = Book(int(data["timestamp"]), streams)
+        heard_as = {(int(ours), int(system), int(part)): int(i) for ours, system, part, i in data["heard_as"]}
+        book = Book(int(data["timestamp"]), streams, heard_as)
     except FileNotFoundError:
         return Book()
     except OSError as error:
@@ -134,7 +136,8 @@ def _load(path: Path, now: int) -> Book:
         raise KeyFileError(f"timestamps {path} are damaged: put the file away once you know who changed it") from error
     if clean:
         return book
-    return Book(_above(book.timestamp, now), {stream: _above(last, now) for stream, last in book.streams.items()})
+    streams = {stream: _above(last, now) for stream, last in book.streams.items()}
+    return Book(_above(book.timestamp, now), streams, heard_as)
 
 
 def _above(kept: int, now: int) -> int:

@@ -1,9 +1,11 @@
 """How do chunks of bytes become MAVLink messages, and back? Survives garbage: it is counted, never raised.
 
 The framing is our own: pymavlink throws a whole bad frame away, and with it the good ones that follow a stray start
-byte. Here a bad frame costs one byte and the search goes on.
+byte. Here a bad frame costs one byte and the search goes on with the next start byte, but not for ever: who sends
+nothing but start bytes must not keep us from our work.
 """
 
+import re
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -18,6 +20,8 @@ from companion.core.transport import Transport, Vouchable, wait_readable
 Message = Any  # a MAVLink_*_message object; pymavlink's classes share no useful static type
 
 BUFFER_MAX_BYTES = 1 << 16  # a stream without a single packet in this much is thrown away
+BAD_FRAMES_MAX = 100  # one after the other; what is left of a chunk is thrown away then
+START_BYTE = re.compile(bytes([ord("["), mav.PROTOCOL_MARKER_V1, mav.PROTOCOL_MARKER_V2, ord("]")]))
 SEQUENCES = 256  # packet sequence numbers wrap here
 
 
@@ -52,17 +56,21 @@ class PacketParser:
             self._buffer.clear()
         self._buffer += chunk
         messages: list[Message] = []
-        at = 0
+        at = bad_frames = 0
         while at < len(self._buffer):
             length = packet_length(self._buffer[at : at + 3])
             if length < 0 or (length > 0 and at + length > len(self._buffer)):
                 break
             message = self._decode(at, length) if length else None
             if message is None:
-                self.counts.bad_bytes += 1
-                at += 1
+                bad_frames += 1
+                start = START_BYTE.search(self._buffer, at + 1) if bad_frames < BAD_FRAMES_MAX else None
+                end = start.start() if start is not None else len(self._buffer)
+                self.counts.bad_bytes += end - at
+                at = end
                 continue
             at += length
+            bad_frames = 0
             if message.get_msgId() == mav.MAVLINK_MSG_ID_UNKNOWN:
                 self.counts.unknown += 1
             elif self._believed(message):

@@ -4,6 +4,9 @@ A signed packet ends in link id (1 byte), timestamp (6 bytes, ticks of 10 us sin
 bytes of SHA-256 over key, packet, link id and timestamp. A stream is (link id, system, component); in each the
 timestamp only ever grows. The signature is judged first: a packet that fails it leaves no trace, whatever its timestamp
 says, so that nobody without the key can make the receiver deaf.
+
+A sender with several links signs on each with another link id. Each of our links listens to one of them, so that what
+the vehicle tells its ground station cannot be played to the companion.
 """
 
 import hashlib
@@ -18,6 +21,7 @@ KEY_BYTES: Final = 32
 EPOCH_UNIX_S: Final = 1_420_070_400  # 2015-01-01T00:00:00Z, where timestamps begin
 TICKS_PER_S: Final = 100_000
 NEW_STREAM_TICKS: Final = 60 * TICKS_PER_S  # a stream never heard may be this much behind us (MAVLink's figure)
+SILENCE_TICKS: Final = 10 * TICKS_PER_S  # after this another link of a sender may take the place of the one heard
 TIMESTAMP_BYTES: Final = 6
 SIGNATURE_BYTES: Final = 6
 
@@ -31,10 +35,11 @@ PX4_UNSIGNED: Final = frozenset(
         mav.MAVLINK_MSG_ID_COLLISION,
     )
 )
-# The companion flies by the vehicle's HEARTBEAT (armed, mode): it wants that one signed.
+# Between vehicle and companion both have the key, and fly by each other's HEARTBEAT: they want that one signed.
 COMPANION_UNSIGNED: Final = frozenset({int(mav.MAVLINK_MSG_ID_RADIO_STATUS)})
 
 Stream = tuple[int, int, int]  # link id, system, component
+Place = tuple[int, int, int]  # number of our own link, system, component
 
 
 class Verdict(Enum):
@@ -43,7 +48,7 @@ class Verdict(Enum):
     GOOD = "good"
     UNSIGNED = "unsigned"
     FORGED = "forged"  # signed with another key, or changed on the way
-    OLD = "old"  # signed well, but heard before or too long ago
+    OLD = "old"  # signed well, but heard before, too long ago, or meant for another link
 
 
 @dataclass(slots=True)
@@ -52,6 +57,7 @@ class Book:
 
     timestamp: int = 0  # the last that we used or believed
     streams: dict[Stream, int] = field(default_factory=dict)  # the last of each stream, our own among them
+    heard_as: dict[Place, int] = field(default_factory=dict)  # by which link id a sender is heard on a link of ours
 
     def stamp(self, stream: Stream, now: int) -> int:
         """The timestamp of the next packet that we send; a reflected copy of it will be old."""
@@ -59,15 +65,21 @@ class Book:
         self.streams[stream] = self.timestamp
         return self.timestamp
 
-    def is_old(self, stream: Stream, timestamp: int, now: int) -> bool:
-        """Was this timestamp overtaken, or is it too far behind for a stream that begins?"""
+    def is_old(self, ours: int, stream: Stream, timestamp: int, now: int) -> bool:
+        """Was this timestamp overtaken, is it too far behind for a stream that begins, or was it told elsewhere?"""
+        link_id, system, component = stream
+        heard = self.heard_as.get((ours, system, component), link_id)
+        if heard != link_id and timestamp <= self.streams.get((heard, system, component), 0) + SILENCE_TICKS:
+            return True
         last = self.streams.get(stream)
         if last is not None:
             return timestamp <= last
         return timestamp + NEW_STREAM_TICKS < max(self.timestamp, now)
 
-    def believe(self, stream: Stream, timestamp: int) -> None:
-        """A packet with a good signature carried this timestamp."""
+    def believe(self, ours: int, stream: Stream, timestamp: int) -> None:
+        """A packet with a good signature carried this timestamp on our link number ``ours``."""
+        link_id, system, component = stream
+        self.heard_as[(ours, system, component)] = link_id
         self.streams[stream] = timestamp
         self.timestamp = max(self.timestamp, timestamp)
 
@@ -82,8 +94,8 @@ def signature(key: bytes, packet: bytes) -> bytes:
     return hashlib.sha256(key + packet).digest()[:SIGNATURE_BYTES]
 
 
-def judge(packet: bytes, key: bytes, book: Book, now: int) -> Verdict:
-    """Judge one whole packet; only a good one changes ``book``."""
+def judge(packet: bytes, key: bytes, book: Book, now: int, ours: int = 0) -> Verdict:
+    """Judge one whole packet from our link number ``ours``; only a good one changes ``book``."""
     if len(packet) < mav.HEADER_LEN_V2 or packet[0] != mav.PROTOCOL_MARKER_V2:
         return Verdict.UNSIGNED
     if not packet[2] & mav.MAVLINK_IFLAG_SIGNED:
@@ -93,7 +105,7 @@ def judge(packet: bytes, key: bytes, book: Book, now: int) -> Verdict:
         return Verdict.FORGED
     stream = (signed[-TIMESTAMP_BYTES - 1], packet[5], packet[6])
     timestamp = int.from_bytes(signed[-TIMESTAMP_BYTES:], "little")
-    if book.is_old(stream, timestamp, now):
+    if book.is_old(ours, stream, timestamp, now):
         return Verdict.OLD
-    book.believe(stream, timestamp)
+    book.believe(ours, stream, timestamp)
     return Verdict.GOOD

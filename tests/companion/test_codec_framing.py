@@ -1,6 +1,7 @@
 """Does the parser find every good packet between garbage, and never raise? And do logs keep what was said?"""
 
 import random
+import time
 from pathlib import Path
 
 import pytest
@@ -170,3 +171,13 @@ def test_a_file_that_is_no_log_is_named(tmp_path: Path) -> None:
     path.write_bytes(b"not a log at all, only words")
     with pytest.raises(TlogError, match=r"holiday\.tlog is no telemetry log"):
         list(read_tlog(path))
+
+
+def test_nothing_but_start_bytes_keeps_nobody_from_work() -> None:
+    """60 kB that would be 6000 beginnings of a HEARTBEAT."""
+    parser = PacketParser()
+    began_s = time.perf_counter()
+    for _ in range(10):
+        assert parser.feed((b"\xfd" + bytes(9)) * 6_000) == []
+    assert time.perf_counter() - began_s < 1.0
+    assert parser.counts.bad_bytes == 600_000

@@ -36,7 +36,7 @@ def test_a_signature_worked_by_hand_is_found_and_believed() -> None:
     assert signature(KEY, HAND_MADE[:-6]) == HAND_MADE[-6:]
     book = Book()
     assert judge(HAND_MADE, KEY, book, now=0) is Verdict.GOOD
-    assert book == Book(HAND_STAMP, {(3, 1, 191): HAND_STAMP})
+    assert book == Book(HAND_STAMP, {(3, 1, 191): HAND_STAMP}, {(0, 1, 191): 3})
     assert judge(HAND_MADE, KEY, book, now=0) is Verdict.OLD
     assert judge(HAND_MADE, KEY[::-1], Book(), now=0) is Verdict.FORGED
 
@@ -50,10 +50,21 @@ def test_not_one_byte_of_a_signed_packet_may_change(place: int) -> None:
     assert book == Book()
 
 
+def test_what_the_vehicle_tells_its_ground_station_cannot_be_played_to_the_companion() -> None:
+    second, book = 100_000, Book()
+    assert judge(forge(0, 1, 1, 100 * second), KEY, book, 0) is Verdict.GOOD
+    assert judge(forge(2, 1, 1, 101 * second), KEY, book, 0) is Verdict.OLD
+    assert judge(forge(0, 1, 1, 102 * second), KEY, book, 0) is Verdict.GOOD, "and does not disturb"
+    assert judge(forge(2, 1, 1, 103 * second), KEY, book, 0, ours=1) is Verdict.GOOD, "on a link of its own it counts"
+    assert judge(forge(2, 1, 1, 112 * second), KEY, book, 0) is Verdict.OLD
+    assert judge(forge(2, 1, 1, 113 * second), KEY, book, 0) is Verdict.GOOD, "the first was silent for ten seconds"
+    assert judge(forge(0, 1, 1, 114 * second), KEY, book, 0) is Verdict.OLD
+
+
 def test_a_forged_packet_from_the_far_future_does_not_make_the_receiver_deaf() -> None:
     book, now = Book(), ticks(round(START_S * 1e6))
     assert judge(forge(*STREAM, timestamp=now), KEY, book, now) is Verdict.GOOD
-    before = Book(book.timestamp, dict(book.streams))
+    before = Book(book.timestamp, dict(book.streams), dict(book.heard_as))
     for timestamp in (now + 1, (1 << 48) - 1):
         assert judge(forge(*STREAM, timestamp=timestamp, broken=True), KEY, book, now) is Verdict.FORGED
         assert judge(forge(*STREAM, timestamp=timestamp, key=bytes(32)), KEY, book, now) is Verdict.FORGED
@@ -69,7 +80,7 @@ def test_whatever_arrives_in_whatever_order_each_stream_only_goes_forward(
     book, heard = Book(), dict[int, int]()
     for link, timestamp, broken in arrivals:
         last, newest = heard.get(link), book.timestamp
-        verdict = judge(forge(link, 255, 190, timestamp, broken=broken), KEY, book, now=0)
+        verdict = judge(forge(link, 255, 190, timestamp, broken=broken), KEY, book, now=0, ours=link)
         assert (verdict is Verdict.FORGED) == broken
         if verdict is Verdict.GOOD:
             assert last is None or timestamp > last
