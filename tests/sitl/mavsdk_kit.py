@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
 from typing import Any
 
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
@@ -14,6 +15,7 @@ from mavsdk.logging import log_subscribe
 from mission_kit import open_world
 
 from companion.core.clock import SystemClock
+from sitl.flight_logs import FlightLogs
 from sitl.link import bind, open_links
 from sitl.server import RunConfig, Server
 from sitl.simulation import SimConfig, Simulation
@@ -22,11 +24,15 @@ PORT = 14030  # of the operator
 
 
 @contextmanager
-def vehicle(instance: int, speed: float = 1.0, sim: SimConfig | None = None) -> Iterator[Server]:
-    """A vehicle on its ports, served by a thread."""
+def vehicle(
+    instance: int, speed: float = 1.0, sim: SimConfig | None = None, folder: Path | None = None
+) -> Iterator[Server]:
+    """A vehicle on its ports, served by a thread; flight logs go into ``folder``."""
     clock = SystemClock()
     links = open_links(bind(instance, clock), 1, None, clock)
-    server = Server(Simulation(open_world(), sim or SimConfig(seed=2)), links, RunConfig(speed=speed), clock)
+    logs = FlightLogs(folder) if folder is not None else None
+    flown = Simulation(open_world(), sim or SimConfig(seed=2))
+    server = Server(flown, links, RunConfig(speed=speed), clock, logs=logs)
     stop = threading.Event()
     thread = threading.Thread(target=server.run, args=(stop.is_set,))
     thread.start()
@@ -105,12 +111,18 @@ async def client(instance: int) -> AsyncIterator[Pilot]:
         mavsdk.destroy()
 
 
-def fly(instance: int, story: Callable[[Pilot], Awaitable[None]], speed: float, sim: SimConfig | None = None) -> None:
+def fly(
+    instance: int,
+    story: Callable[[Pilot], Awaitable[None]],
+    speed: float,
+    sim: SimConfig | None = None,
+    folder: Path | None = None,
+) -> None:
     """Run a story with a client and a vehicle of its own."""
 
     async def told() -> None:
         async with client(instance) as pilot:
             await story(pilot)
 
-    with vehicle(instance, speed, sim):
+    with vehicle(instance, speed, sim, folder):
         asyncio.run(told())
