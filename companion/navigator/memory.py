@@ -51,9 +51,10 @@ class Memory:
     policy: F64 | None  # whatever the policy wants to see again
     decisions: int
     state: VehicleState | None  # the last one that could be believed
+    ground_down_m: float  # where the autopilot last stood, by its own estimate
     engaged: Engagement | None
 
 
 def start(params: Params) -> Memory:
     """Nothing seen, nobody flies."""
-    return Memory(gridmap.empty(params.map), (), 0, 0.0, 0.0, None, 0, None, None)
+    return Memory(gridmap.empty(params.map), (), 0, 0.0, 0.0, None, 0, None, 0.0, None)

@@ -10,10 +10,11 @@ import numpy as np
 
 from companion.arbiter import arbiter
 from companion.arbiter.facts import Facts, Thresholds, landing_safe, thresholds
+from companion.core import gridmap
 from companion.core.frames import yaw_rad
 from companion.core.inputs import Inputs
 from companion.core.task import Task
-from companion.core.types import NavMode, Setpoint, VehicleState
+from companion.core.types import AutopilotStatus, LandedState, NavMode, Setpoint, VehicleState
 from companion.guidance import landing, limits, line
 from companion.navigator.believe import believable, stand_in
 from companion.navigator.decide import Decision, decide, due
@@ -22,8 +23,6 @@ from companion.navigator.params import Params
 from companion.navigator.record import Record
 from companion.navigator.track import Route, Tracked, course_along, track, turned
 from companion.perception.perceive import Percept, Remembered, perceive
-
-GROUND_DOWN_M = 0.0  # local NED begins on the ground where the autopilot booted
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +36,7 @@ class _Scene:
     limits: Thresholds
     facts: Facts
     dt_s: float
+    ground_down_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
         inputs = stand_in(inputs, memory.state, memory.t_s)
     state = inputs.state
     percept = perceive(
-        Remembered(memory.t_s, memory.grid, memory.tracks),
+        _remembered(memory, inputs.status, params),
         inputs,
         task.goal_ned_m,
         params.vehicle.radius_m,
@@ -79,14 +79,14 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
     dt_s = state.t_s - memory.t_s
     memory = replace(memory, grid=percept.grid, tracks=percept.tracks, ticks=memory.ticks + 1, t_s=state.t_s)
     if known:
-        memory = replace(memory, state=state)
+        memory = replace(memory, state=state, ground_down_m=_ground(memory, inputs))
     goal_m = _goal_distance(state, task)
     if not (inputs.status.offboard and inputs.status.armed) or memory.state is None:
         memory, setpoint = _standby(memory, state)
         return memory, setpoint, Record(inputs, percept, memory, setpoint, goal_m)
     engaged = memory.engaged or _engage(state, task)
     facts = _facts(inputs, percept, engaged, goal_m)
-    scene = _Scene(state, percept, task, params, _thresholds(percept, params), facts, dt_s)
+    scene = _Scene(state, percept, task, params, _thresholds(percept, params), facts, dt_s, memory.ground_down_m)
     engaged = _arbitrated(engaged, scene)
     steered = _steer(memory, engaged, scene)
     yaw_sp = memory.yaw_sp_rad if steered.setpoint.yaw_rad is None else steered.setpoint.yaw_rad
@@ -106,6 +106,19 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
         steered.touchdown,
     )
     return memory, steered.setpoint, record
+
+
+def _remembered(memory: Memory, status: AutopilotStatus, params: Params) -> Remembered:
+    """Nothing, while the motors are off: an autopilot that is still finding north and its place would spoil the map."""
+    if not status.armed:
+        return Remembered(memory.t_s, gridmap.empty(params.map), (), memory.ground_down_m)
+    return Remembered(memory.t_s, memory.grid, memory.tracks, memory.ground_down_m)
+
+
+def _ground(memory: Memory, inputs: Inputs) -> float:
+    """Where it stands is the ground: an autopilot's height may be a metre off where it booted (GPS, barometer)."""
+    standing = not inputs.status.armed and inputs.status.landed == LandedState.ON_GROUND
+    return float(inputs.state.pos_ned_m[2]) if standing else memory.ground_down_m
 
 
 def _standby(memory: Memory, state: VehicleState) -> tuple[Memory, Setpoint]:
@@ -155,7 +168,7 @@ def _arbitrated(engaged: Engagement, scene: _Scene) -> Engagement:
         return replace(engaged, line=fresh_line, line_s_m=0.0, path=None, landing=None)
     if after.mode == NavMode.RL:
         return replace(engaged, path=None, landing=None)
-    began = landing.start(scene.state, scene.task.goal_ned_m, GROUND_DOWN_M, engaged.down_m)
+    began = landing.start(scene.state, scene.task.goal_ned_m, scene.ground_down_m, engaged.down_m)
     return replace(engaged, path=None, landing=began)
 
 

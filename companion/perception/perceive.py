@@ -62,6 +62,7 @@ class Remembered:
     t_s: float
     grid: GridMap
     tracks: tuple[Track, ...]
+    ground_down_m: float = 0.0  # height of the ground in local NED
 
 
 def perceive(
@@ -75,7 +76,7 @@ def perceive(
 ) -> Percept:
     """Digest one scan."""
     state, pos_ne_m = inputs.state, inputs.state.pos_ned_m[:2]
-    flat = flatten(inputs.scan, state, params.lidar_up_m, params.ground_margin_m)
+    flat = flatten(inputs.scan, state, params.lidar_up_m + before.ground_down_m, params.ground_margin_m)
     grid = update(before.grid, flat.polar, map_params)
     tracks = follow(before.tracks, grid.moved_ne_m, pos_ne_m, state.t_s, state.t_s - before.t_s, mover_params)
     static, swept = occupied_points(grid, state.t_s, map_params), hazards(tracks, mover_params)

@@ -34,8 +34,8 @@ def flatten(scan: Scan, state: VehicleState, lidar_up_m: float, ground_margin_m:
 
     Args:
         scan: slant ranges in the body plane.
-        state: pose at the scan's instant; local NED, ground at down = 0.
-        lidar_up_m: height of the LiDAR above that position.
+        state: pose at the scan's instant; local NED.
+        lidar_up_m: height of the LiDAR above that position, plus the down of the ground in local NED.
         ground_margin_m: returns lower than this above the ground are the ground.
     """
     rotation = rotation_ned_frd(state.q_ned_frd)

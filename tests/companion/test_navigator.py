@@ -9,9 +9,10 @@ from scene import CLUTTER, DOWN_M, DT_S, FLYING, HOVERING, PARAMS, Eye, Pilot, r
 
 from companion.checker.checker import VerdictKind
 from companion.core.task import Task
-from companion.core.types import NavMode
+from companion.core.types import LandedState, NavMode
 from companion.navigator import Record
 
+STANDING = dataclasses.replace(HOVERING, armed=False, landed=LandedState.ON_GROUND)
 OPEN = world()
 GOAL = Task(np.array([30.0, 0.0]), None, 3.0)
 HERE = Task(np.array([0.5, 0.0]), None, 3.0)
@@ -54,6 +55,27 @@ def test_until_it_may_fly_it_answers_with_where_the_vehicle_is(status) -> None:
         assert (record.setpoint.vel_ned_m_s, record.setpoint.acc_ned_m_s2) == (None, None)
         assert record.setpoint.yaw_rad == pytest.approx(0.02 * k)
         assert (record.memory.engaged, record.decision) == (None, None)
+
+
+def test_what_was_seen_while_the_motors_were_off_is_forgotten() -> None:
+    pilot = Pilot(Eye(TRUNKS), GOAL)  # by an autopilot that does not know yet where it is
+    seen = pilot.ticks(20, status=STANDING)[-1]
+    pilot.eye = Eye(OPEN)
+    assert len(seen.percept.static_ne_m) > 0
+    assert len(pilot.tick(status=HOVERING).percept.static_ne_m) == 0
+
+
+@pytest.mark.parametrize("ground_down_m", [-1.2, -0.5, 0.0, 0.7])
+def test_the_ground_is_where_the_vehicle_last_stood(ground_down_m: float) -> None:
+    pilot = Pilot(Eye(OPEN), GOAL)
+    pilot.ticks(3, status=STANDING, pos_ned_m=(0.0, 0.0, ground_down_m))
+    record = pilot.tick(pos_ned_m=(0.0, 0.0, ground_down_m - 2.0))
+    assert record.memory.ground_down_m == ground_down_m
+    pilot = Pilot(Eye(OPEN), HERE)
+    pilot.ticks(3, status=STANDING, pos_ned_m=(0.0, 0.0, ground_down_m))
+    engaged = pilot.ticks(40, pos_ned_m=(0.0, 0.0, ground_down_m - 2.0))[-1].memory.engaged
+    assert engaged is not None and engaged.landing is not None
+    assert engaged.landing.goal_down_m == ground_down_m
 
 
 def test_it_looks_round_before_it_may_fly() -> None:
