@@ -30,12 +30,12 @@ ESTIMATOR_AUTOPILOT: Final = 8  # MAV_ESTIMATOR_TYPE_AUTOPILOT
 
 def highres_imu(sim: Simulation) -> Message:
     """HIGHRES_IMU; pressure in Pa, as PX4 v1.16 sends it."""
-    truth = sim.truth
-    alt_m = ORIGIN.alt_m(float(truth.pos_ned_m[2]))
+    alt_m = _baro_alt_m(sim)
+    acc_frd_m_s2, rates_frd_rad_s = sim.trouble.felt(sim.truth)
     return mav.MAVLink_highres_imu_message(
-        codec.to_us(truth.t_s),
-        *truth.acc_frd_m_s2.tolist(),
-        *truth.rates_frd_rad_s.tolist(),
+        codec.to_us(sim.truth.t_s),
+        *acc_frd_m_s2.tolist(),
+        *rates_frd_rad_s.tolist(),
         *_field_frd_gauss(sim).tolist(),
         pressure_at(alt_m) * 100.0,
         0.0,
@@ -57,7 +57,7 @@ def raw_imu(sim: Simulation) -> Message:
 
 def scaled_pressure(sim: Simulation) -> Message:
     """SCALED_PRESSURE."""
-    alt_m = ORIGIN.alt_m(float(sim.truth.pos_ned_m[2]))
+    alt_m = _baro_alt_m(sim)
     return mav.MAVLink_scaled_pressure_message(
         codec.to_ms(sim.truth.t_s), pressure_at(alt_m), 0.0, round(_temperature_c(alt_m) * 100)
     )
@@ -170,10 +170,14 @@ def _field_frd_gauss(sim: Simulation) -> F64:
     return field
 
 
+def _baro_alt_m(sim: Simulation) -> float:
+    return ORIGIN.alt_m(float(sim.truth.pos_ned_m[2] + sim.trouble.errors.pos_ned_m[2]))
+
+
 def _imu_units(sim: Simulation) -> list[int]:
     """Milli-g, mrad/s, mgauss."""
-    truth = sim.truth
-    scaled = (truth.acc_frd_m_s2 / GRAVITY_M_S2, truth.rates_frd_rad_s, _field_frd_gauss(sim))
+    acc_frd_m_s2, rates_frd_rad_s = sim.trouble.felt(sim.truth)
+    scaled = (acc_frd_m_s2 / GRAVITY_M_S2, rates_frd_rad_s, _field_frd_gauss(sim))
     return [_int16(value * 1e3) for vector in scaled for value in vector.tolist()]
 
 

@@ -117,6 +117,8 @@ class Steering:
     def change_speed(self, speed_m_s: float | None) -> None:
         """Fly on at another horizontal speed, until the mode changes."""
         self.cruise_m_s = speed_m_s
+        if self.mission is not None:
+            self.mission.set_speed(speed_m_s)
         if self.goal is not None:
             self.reposition(Goal(self.goal.pos_ned_m, self.goal.yaw_rad, speed_m_s))
 

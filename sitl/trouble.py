@@ -64,6 +64,13 @@ class Trouble:
             truth.rates_frd_rad_s + errors.rates_frd_rad_s,
         )
 
+    def felt(self, truth: Truth) -> tuple[F64, F64]:
+        """Specific force and body rates (3,) as the sensors give them."""
+        errors = self.errors
+        if not errors.any:
+            return truth.acc_frd_m_s2, truth.rates_frd_rad_s
+        return truth.acc_frd_m_s2 + errors.acc_frd_m_s2, truth.rates_frd_rad_s + errors.rates_frd_rad_s
+
     def shifted(self, pos_ned_m: F64, vel_ned_m_s: F64) -> tuple[F64, F64]:
         """Position and velocity demands (3,) as the loops, which know the truth, have to be given them."""
         errors = self.errors
