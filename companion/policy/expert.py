@@ -41,7 +41,6 @@ BORDER_CELLS = 2  # paths to a goal outside the map end in this rim
 SHORTEST_USEFUL_M = 3.0  # five waypoints should reach at least this far, else the chords are relaxed
 CHORD_RELAX = (1.0, 2.0, 4.0)
 CHORD_POINTS = 20  # of the path that one chord replaces, at most
-DETOUR_CELLS = 60.0  # a way that costs so much more than the straight one is looked for only if there is no cheaper
 UNREACHED = 4.0  # cost a cell from where a way ends to a goal on the map: that is approached as near as possible
 
 
@@ -115,15 +114,12 @@ def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) ->
         source = _nearest_open(grid, field, query.prefix_ne_m[-1])
     ahead = _straight_cells(query)
     kept = _kept(query, field, old, params)
-    detours: tuple[float, ...] = (DETOUR_CELLS, LIMIT)
+    detour = LIMIT
     if kept is not None:
         worth = _path_cost(kept, query, field) / (params.keep_ratio * grid.cell_m)
-        detours = (worth - float(ahead.ravel()[source]),)
-    for detour in detours:
-        cells = _cheapest(field.cost, source, ahead, detour) if detour > 0.0 else None
-        if cells is not None:
-            return _smooth(_places(cells, query), grid, field, params.sweeps)
-    return kept
+        detour = worth - float(ahead.ravel()[source])
+    cells = _cheapest(field.cost, source, ahead, detour) if detour > 0.0 else None
+    return kept if cells is None else _smooth(_places(cells, query), grid, field, params.sweeps)
 
 
 def _straight_cells(query: Query) -> F64:
