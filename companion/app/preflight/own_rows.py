@@ -1,5 +1,7 @@
 """Are our own settings, disk and computer fit? Judgements; the disk and the clock are read by the shell."""
 
+import hashlib
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,13 +12,14 @@ import numpy as np
 from companion.app.preflight.rows import Grade, Row
 from companion.core.inputs import Inputs
 from companion.core.mavlink import LinkCounts
-from companion.core.params import ParamError, infos
+from companion.core.params import ParamError, as_dict, infos
 from companion.core.task import Task
 from companion.core.types import AutopilotStatus, LandedState
 from companion.navigator import Params
 from companion.navigator.decide import policy_named
 
-FREE_WARN_BYTES, FREE_FAIL_BYTES = 10**9, 10**8  # an hour of flight writes about 100 MB
+FREE_WARN_BYTES, FREE_FAIL_BYTES = 10**9, 10**8  # an hour of flight writes some 200 MB
+DIGEST_CHARS: Final = 12  # enough to tell two parameter sets apart
 TICK_WARN_MS: Final = 20.0
 TICK_FAIL_MS: Final = 60.0
 FLYING: Final = AutopilotStatus(armed=True, offboard=True, landed=LandedState.IN_AIR)
@@ -29,7 +32,9 @@ def params_row(params: Params, problem: str | None) -> Row:
     entries = list(infos(params))
     values = {info.key: getattr(getattr(params, info.key.split(".")[0]), info.key.split(".")[1]) for info in entries}
     changed = [f"{info.key} {values[info.key]}" for info in entries if values[info.key] != info.default]
-    return Row("parameters", Grade.OK, f"{len(entries)} valid; changed: {', '.join(changed) or 'none'}")
+    digest = hashlib.sha256(json.dumps(as_dict(params), sort_keys=True).encode()).hexdigest()[:DIGEST_CHARS]
+    found = f"{len(entries)} valid, sha256 {digest}; changed: {', '.join(changed) or 'none'}"
+    return Row("parameters", Grade.OK, found)
 
 
 def policy_row(params: Params) -> Row:
@@ -38,7 +43,7 @@ def policy_row(params: Params) -> Row:
         policy = policy_named(params.policy.name, params)
     except ParamError as error:
         return Row("policy", Grade.FAIL, str(error), "policy.name")
-    return Row("policy", Grade.OK, policy.name)
+    return Row("policy", Grade.OK, f"{policy.name}, built in: no weights to compare")
 
 
 def task_row(task: Task | None) -> Row:
