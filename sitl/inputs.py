@@ -17,8 +17,6 @@ from sitl.simulation import Simulation
 
 Message = Any  # a MAVLink_*_message object
 
-HAS_VELOCITY = 2  # FOLLOW_TARGET.est_capabilities
-
 
 class Inputs:
     """Serves one vehicle on every link."""
@@ -63,7 +61,7 @@ class Inputs:
         if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0 and math.isfinite(message.alt)):
             return
         vel = np.array(message.vel, dtype=np.float64)
-        if not (message.est_capabilities & HAS_VELOCITY and np.isfinite(vel).all()):
+        if not np.isfinite(vel).all():
             vel = np.zeros(3)
         pos = np.array([*ORIGIN.north_east_m(lat_deg, lon_deg), ORIGIN.down_m(message.alt)])
         self._sim.autopilot.steering.target = Target(self._sim.t_s, pos, vel)
