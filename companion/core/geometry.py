@@ -145,7 +145,7 @@ def points_near(path_ned_m: F64, points_ned_m: F64, reach_m: float) -> F64:
     north, east = points_ned_m[:, 0], points_ned_m[:, 1]
     inside = (north >= min(norths) - reach_m) & (north <= max(norths) + reach_m)
     inside &= (east >= min(easts) - reach_m) & (east <= max(easts) + reach_m)
-    near: F64 = points_ned_m[inside]
+    near: F64 = points_ned_m.compress(inside, axis=0)
     return near
 
 
@@ -207,7 +207,7 @@ def _brushed(cut: "_Cut", points_ned_m: F64, reach_m: float) -> F64:
     along, lateral = _in_segments(cut, points_ned_m)
     half = cut.length_m / 2.0
     inside = (np.abs(lateral) < reach_m) & (np.abs(along - half) < half + reach_m)
-    brushed: F64 = points_ned_m[inside.any(axis=0)]
+    brushed: F64 = points_ned_m.compress(inside.any(axis=0), axis=0)
     return brushed
 
 

@@ -17,7 +17,7 @@ from companion.core.params import param
 from companion.core.types import F64
 
 F32 = NDArray[np.float32]
-I32 = NDArray[np.int32]
+Index = NDArray[np.intp]
 
 AZIMUTH_BINS = 720  # 0.5 deg: 12 cm at 14 m, finer than a cell
 SUBCELLS = 4  # range and azimuth tables exist for 4 x 4 positions of the vehicle inside its cell
@@ -98,15 +98,15 @@ def occupied(grid: GridMap, t_s: float, params: MapParams) -> NDArray[np.bool_]:
 def occupied_points(grid: GridMap, t_s: float, params: MapParams) -> F64:
     """(k, 2) remembered hits, north and east."""
     cells = np.flatnonzero(occupied(grid, t_s, params))
-    return grid.hit_ne_m.reshape(-1, 2)[cells].astype(np.float64)
+    return grid.hit_ne_m.reshape(-1, 2).take(cells, axis=0).astype(np.float64)
 
 
-def cells_of(grid: GridMap, points_ne_m: F64) -> tuple[I32, NDArray[np.bool_]]:
+def cells_of(grid: GridMap, points_ne_m: F64) -> tuple[Index, NDArray[np.bool_]]:
     """Flat cell index of each point (k, 2), 0 outside the map, and whether the point lies inside."""
     n = grid.free_t.shape[0]
-    cells = np.floor(points_ne_m / grid.cell_m).astype(np.int32)
-    cells -= np.array(grid.corner, np.int32)
-    row, column = cells.view(np.uint32).T  # what is negative becomes large
+    cells = np.floor(points_ne_m / grid.cell_m).astype(np.intp)
+    cells -= np.array(grid.corner, np.intp)
+    row, column = cells.view(np.uintp).T  # what is negative becomes large
     inside = (row < n) & (column < n)
     return (cells[:, 0] * n + cells[:, 1]) * inside, inside
 
@@ -196,20 +196,19 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     Returns the middles of the latter arcs, (m, 2), but for those with a cell behind them that was not certified: the
     rim of something that stands and is passed shows itself a few centimetres inside cells that count as free.
     """
-    near = scan.hit_m < params.sense_m
-    if not near.any():
+    near = np.flatnonzero(scan.hit_m < params.sense_m)
+    if len(near) == 0:
         return np.empty((0, 2))
-    range_m, sector = scan.hit_m[near], scan.hit_sector[near]
-    direction = AZIMUTH_DIR[scan.hit_bin[near]]
-    points = scan.pos_ne_m + direction * range_m[:, None]
+    sector, direction = scan.hit_sector.take(near), AZIMUTH_DIR.take(scan.hit_bin.take(near), axis=0)
+    points = direction * scan.hit_m.take(near)[:, None] + scan.pos_ne_m
     flat, inside = cells_of(grid, points)
     lately = np.float32(max(scan.t_s - params.certified_s, 0.0))
     possible = inside & (free_t.take(flat) <= lately)
     whole = (np.bincount(sector, possible) == 0.0).take(sector)
     paint = inside & (possible | whole)
-    cells = flat[paint]
+    cells = flat.compress(paint)
     hit_t.ravel()[cells] = scan.t_s
-    _place(hit_ne_m, cells, points[paint])
+    _place(hit_ne_m, cells, points.compress(paint, axis=0))
     if not whole.any():
         return np.empty((0, 2))
     behind, there = cells_of(grid, points + direction * grid.cell_m)
@@ -221,14 +220,14 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     return np.stack(middle, axis=1)
 
 
-def _place(hit_ne_m: F32, cells: I32, points_ne_m: F64) -> None:
+def _place(hit_ne_m: F32, cells: Index, points_ne_m: F64) -> None:
     """Write the hits of one scan; of several in one cell the middle of first and last, so that left equals right."""
     stored = hit_ne_m.reshape(-1).view(np.complex64)  # north and east as one number: a third of the time
     points = points_ne_m.astype(np.float32).reshape(-1).view(np.complex64)
     stored[cells[::-1]] = points[::-1]
-    first = stored[cells]
+    first = stored.take(cells)
     stored[cells] = points
-    stored[cells] = (first + stored[cells]) * np.float32(0.5)
+    stored[cells] = (first + stored.take(cells)) * np.float32(0.5)
 
 
 def _window(n: int, i: int, j: int, radius: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:

@@ -57,8 +57,8 @@ def flatten(scan: Scan, state: VehicleState, lidar_up_m: float, ground_margin_m:
         pos_ne_m=state.pos_ned_m[:2].copy(),
         free_m=proven_m.take(sector) * stretch,
         hit_bin=bins,
-        hit_m=horizontal_m[bins],
-        hit_sector=sector[bins],
+        hit_m=horizontal_m.take(bins),
+        hit_sector=sector.take(bins),
     )
     nothing_m = np.where(known, np.inf, np.nan).take(sector)
     return Flattened(polar, _at_bearings(np.where(bin_hit, horizontal_m, nothing_m), rotation))
