@@ -89,7 +89,7 @@ def global_position_int(sim: Simulation) -> Message:
         _e7(lat_deg),
         _e7(lon_deg),
         round(ORIGIN.alt_m(down_m) * 1e3),
-        round(-down_m * 1e3),
+        round((_home_down_m(sim) - down_m) * 1e3),
         *(_clip16(v * 1e2) for v in state.vel_ned_m_s.tolist()),
         _heading_cdeg(sim),
     )
@@ -154,13 +154,24 @@ def battery_status(sim: Simulation) -> Message:
 
 def home_position(sim: Simulation) -> Message | None:
     """HOME_POSITION; None until the vehicle knows where it is."""
-    if not sim.autopilot.ready:
+    home = sim.autopilot.home
+    if home is None:
         return None
-    yaw_rad = sim.config.spawn_yaw_rad
-    q = [math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2)]
-    lat, lon, alt = _e7(ORIGIN.lat_deg), _e7(ORIGIN.lon_deg), round(ORIGIN.alt_amsl_m * 1e3)
+    q = [math.cos(home.yaw_rad / 2), 0.0, 0.0, math.sin(home.yaw_rad / 2)]
+    north_m, east_m, down_m = home.pos_ned_m.tolist()
+    lat_deg, lon_deg = ORIGIN.lat_lon_deg(north_m, east_m)
     return mav.MAVLink_home_position_message(
-        lat, lon, alt, 0.0, 0.0, 0.0, q, math.nan, math.nan, math.nan, codec.to_us(sim.t_s)
+        _e7(lat_deg),
+        _e7(lon_deg),
+        round(ORIGIN.alt_m(down_m) * 1e3),
+        north_m,
+        east_m,
+        down_m,
+        q,
+        math.nan,
+        math.nan,
+        math.nan,
+        codec.to_us(sim.t_s),
     )
 
 
@@ -169,7 +180,7 @@ def altitude(sim: Simulation) -> Message:
     down_m = float(sim.state.pos_ned_m[2])
     amsl_m = ORIGIN.alt_m(down_m)
     return mav.MAVLink_altitude_message(
-        codec.to_us(sim.state.t_s), amsl_m, amsl_m, -down_m, -down_m, math.nan, math.nan
+        codec.to_us(sim.state.t_s), amsl_m, amsl_m, -down_m, _home_down_m(sim) - down_m, math.nan, math.nan
     )
 
 
@@ -243,6 +254,11 @@ def _battery_percent(sim: Simulation) -> int:
 
 def _cell_v(sim: Simulation) -> float:
     return CELL_EMPTY_V + (CELL_FULL_V - CELL_EMPTY_V) * _battery_percent(sim) / 100
+
+
+def _home_down_m(sim: Simulation) -> float:
+    home = sim.autopilot.home
+    return home.down_m if home is not None else 0.0
 
 
 def _heading_cdeg(sim: Simulation) -> int:

@@ -7,6 +7,7 @@ from typing import Any, Final
 from pymavlink.dialects.v20 import common as mav
 
 from sitl import messages
+from sitl.home import Home
 from sitl.link import Link
 from sitl.message_table import BUILDERS
 from sitl.simulation import Simulation
@@ -14,7 +15,7 @@ from sitl.streams import NAVIGATION
 
 Message = Any  # a MAVLink_*_message object
 
-READY_NEWS: Final = (mav.MAVLINK_MSG_ID_SYS_STATUS, mav.MAVLINK_MSG_ID_HOME_POSITION)
+READY_NEWS: Final = (mav.MAVLINK_MSG_ID_SYS_STATUS,)
 DATAGRAM_MESSAGES: Final = 8  # at most 2048 bytes, which is what MAVSDK reads of a datagram
 SCAN: Final = mav.MAVLINK_MSG_ID_OBSTACLE_DISTANCE  # to the companion with every scan, not by the schedule
 
@@ -37,6 +38,7 @@ class Voice:
         self._say = say
         self._told: tuple[object, ...] = ()  # what the last heartbeats said
         self._told_ready = False
+        self._told_home: Home | None = None
         self._texts = 0
 
     def bundle(self, with_status: bool) -> ScanBundle:
@@ -76,6 +78,10 @@ class Voice:
             self._told_ready = ap.ready
             news = (BUILDERS[message_id](self._sim) for message_id in READY_NEWS)
             self._to_all(*(message for message in news if message is not None))
+        if ap.home is not self._told_home:
+            self._told_home = ap.home
+            moved = messages.home_position(self._sim)
+            self._to_all(*([moved] if moved is not None else []))
         texts, ap.texts[:] = list(ap.texts), []
         for text in texts:
             self._texts = self._texts % 0xFFFF + 1
