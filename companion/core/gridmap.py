@@ -84,8 +84,10 @@ def empty(params: MapParams) -> GridMap:
 def update(grid: GridMap, scan: PolarScan, params: MapParams) -> GridMap:
     """The map after one more scan."""
     grid = _rolled(grid, scan.pos_ne_m)
-    hit_t, free_t, hit_ne_m = grid.hit_t.copy(), grid.free_t.copy(), grid.hit_ne_m.copy()
-    _certify(grid, free_t, hit_t, scan, params)
+    certain = _certain(grid, scan, params)
+    free_t = np.maximum(grid.free_t, certain * np.float32(scan.t_s))
+    hit_t = grid.hit_t * (1.0 - certain)
+    hit_ne_m = grid.hit_ne_m.copy()
     moved_ne_m = _paint(grid, free_t, hit_t, hit_ne_m, scan, params)
     return replace(grid, free_t=free_t, hit_t=hit_t, hit_ne_m=hit_ne_m, moved_ne_m=moved_ne_m)
 
@@ -152,18 +154,19 @@ def _shifted(cells: F32, di: int, dj: int, fill: np.float32) -> F32:
     return out
 
 
-def _certify(grid: GridMap, free_t: F32, hit_t: F32, scan: PolarScan, params: MapParams) -> None:
-    """Mark every cell that lies inside the proven wedge, but for the tips of its corners (a fifth of a cell)."""
+def _certain(grid: GridMap, scan: PolarScan, params: MapParams) -> F32:
+    """(n, n) 1 for every cell that lies inside the proven wedge but for the tips of its corners (a fifth of a cell).
+
+    Numbers, not a mask: arithmetic is five times as fast as masked writes on a mask this ragged.
+    """
     table = _polar_table(params.cell_m, round(params.sense_m / params.cell_m))
     eroded = _eroded((np.minimum(scan.free_m, params.sense_m) - params.noise_m).astype(np.float32), table)
     (i, sub_i), (j, sub_j) = (_sub_cell(place_m / grid.cell_m) for place_m in scan.pos_ne_m.tolist())
     reach = eroded.ravel().take(table.ring_bin[sub_i, sub_j])
-    certain = (table.far_edge_m[sub_i, sub_j] < reach).astype(np.float32)
-    window, part = _window(free_t.shape[0], i - grid.corner[0], j - grid.corner[1], table.radius_cells)
-    # Arithmetic instead of masked writes: five times as fast on a mask this ragged.
-    certain = certain[part]
-    np.maximum(free_t[window], certain * np.float32(scan.t_s), out=free_t[window])
-    hit_t[window] *= 1.0 - certain
+    certain = np.zeros(grid.free_t.shape, np.float32)
+    window, part = _window(len(certain), i - grid.corner[0], j - grid.corner[1], table.radius_cells)
+    certain[window] = (table.far_edge_m[sub_i, sub_j] < reach)[part]
+    return certain
 
 
 def _sub_cell(place: float) -> tuple[int, int]:
