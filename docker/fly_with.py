@@ -10,7 +10,7 @@ from pathlib import Path
 from mission.console import FlightConsole, LogTail, print_result
 from mission.flight_folder import make_folder
 from mission.flight_plan import plan_flight
-from mission.runner import FlySettings, check_ports, fly
+from mission.runner import FlySettings, fly, free_instance
 
 MISSION, SEED = "trajectory1", 0
 EVERYBODY = 0o777  # an image's user is not ours
@@ -19,8 +19,7 @@ EVERYBODY = 0o777  # an image's user is not ours
 def main(folder: str, *program: str) -> int:
     """Fly once."""
     plan = plan_flight(MISSION, SEED)
-    settings = FlySettings(companion_program=program)
-    check_ports(settings.instance)
+    settings = FlySettings(instance=free_instance(), companion_program=program)
     place = make_folder(plan, Path(folder))
     place.chmod(EVERYBODY)
     with FlightConsole(f"{MISSION} by {program[0]}", LogTail(place / "navigator.jsonl")) as console:

@@ -1,6 +1,7 @@
 #!/bin/sh
 # Builds every image and tries it out: `make images`. With docker or podman where one runs; otherwise, as root on a
 # Debian, with buildah on a base made by debootstrap: apt-get install buildah debootstrap.
+# images.sh build | images.sh try: one of the two only.
 # PYTHON: an interpreter with swiftnav[sitl], for the vehicle that the companion's image flies.
 set -eu
 cd "$(dirname "$0")/.."
@@ -21,7 +22,7 @@ choose_engine() {
     done
     if [ "$(id -u)" = 0 ] && command -v buildah >/dev/null && command -v debootstrap >/dev/null; then
         ENGINE=buildah
-        export BUILDAH_ISOLATION=chroot STORAGE_DRIVER=vfs
+        export BUILDAH_ISOLATION=chroot
         make_base
         return
     fi
@@ -106,7 +107,12 @@ try_companion() {
 
 try_others() {
     say "sitl: flies trajectory1 by itself"
-    run sitl "$WORK" swiftnav fly trajectory1 --out /data/flights/try
+    if [ "$ENGINE" = buildah ]; then # in a network of its own, as the other engines have it
+        unshare --net sh -c 'ip link set lo up && exec "$@"' sh \
+            buildah --root "$WORK/store" --runroot "$WORK/run" run "$(container_of sitl)" -- swiftnav fly trajectory1
+    else
+        "$ENGINE" run --rm swiftnav-sitl fly trajectory1
+    fi
     say "relay: has what it starts"
     if [ "$ENGINE" = buildah ]; then
         run relay "$WORK" socat -V | head -2
@@ -117,7 +123,11 @@ try_others() {
 
 choose_engine
 say "with $ENGINE"
-for image in companion sitl relay; do build "$image"; done
-try_companion
-try_others
-say "all images are built and have run"
+if [ "${1:-build}" = build ]; then
+    for image in companion sitl relay; do build "$image"; done
+fi
+if [ "${1:-try}" = try ]; then
+    try_companion
+    try_others
+fi
+say "done"

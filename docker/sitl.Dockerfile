@@ -40,6 +40,9 @@ ENV PATH=/venv/bin:$PATH \
     OPENBLAS_NUM_THREADS=1
 USER 10001
 WORKDIR /data
+# The LiDAR's kernel, compiled: the first flight on a processor like this one need not wait for it.
+RUN python -c "from mission.world_file import load_world; from sitl.simulation import SimConfig, Simulation; \
+    Simulation(load_world('open'), SimConfig())"
 VOLUME /data/flights
 # Healthy: the vehicle's companion port (14580, 38F4 in hexadecimal) is open.
 HEALTHCHECK --interval=10s --timeout=5s --start-period=60s --retries=3 \
