@@ -187,6 +187,7 @@ async def inject(pilot: Pilot, unit: Any, kind: Any) -> None:
     await failure.inject(unit, kind, 0)
 
 
+@pytest.mark.slow
 def test_a_breached_fence_sends_the_vehicle_home() -> None:
     async def story(pilot: Pilot) -> None:
         param, fence = ParamAsync(pilot.system), GeofenceAsync(pilot.system)
