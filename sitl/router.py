@@ -37,7 +37,7 @@ class Router:
         self._sim = sim
         self._missions = MissionService(sim, system_id)
         self._logs = LogService(logs, system_id)
-        self._now_s = 0.0  # wall
+        self._now_s = math.nan  # wall, of the last tick
         self._gcs_heard_s = math.nan
         self._system_id = system_id
         self.handlers: Mapping[int, Callable[[Link, Message], None]] = {
