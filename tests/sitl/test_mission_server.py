@@ -76,7 +76,7 @@ def test_mission_current_comes_every_second_on_every_link(operator: Client, grou
         began_s = time.monotonic()
         for _ in range(3):
             client.message("MISSION_CURRENT")
-        assert 2.0 < time.monotonic() - began_s < 6.0  # not sharper: the machine may be busy
+        assert 1.0 < time.monotonic() - began_s < 9.0  # not sharper: the machine may be busy
 
 
 def test_a_mission_uploaded_on_one_link_is_read_on_another(operator: Client, ground: Client) -> None:
