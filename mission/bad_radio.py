@@ -42,7 +42,7 @@ class Flight:
     @property
     def safe(self) -> bool:
         """Landed, or holding in the air; nothing touched."""
-        return self.result.collisions == 0 and (self.result.landed or self.end_mode in ("HOLD", "OFFBOARD"))
+        return self.result.collisions == 0 and (self.result.landed or self.end_mode == "HOLD")
 
 
 def fly(name: str, seed: int, loss: Loss, instance: int, folder: Path) -> Flight:
@@ -82,11 +82,12 @@ def _longest_without(rows: list[dict[str, object]]) -> float:
 
 def table(flights: list[Flight]) -> str:
     """One line a flight."""
-    lines = ["seed  safe  end mode  least clearance  time    out of OFFBOARD  datagrams        reason"]
+    lines = ["seed  safe  end       least clearance  time    out of OFFBOARD  datagrams        reason"]
     for flight in flights:
         least = flight.result.min_clearance_m
+        end = "landed" if flight.result.landed else flight.end_mode
         lines.append(
-            f"{flight.seed:4d}  {'yes' if flight.safe else 'NO':<4}  {flight.end_mode:<8}"
+            f"{flight.seed:4d}  {'yes' if flight.safe else 'NO':<4}  {end:<8}"
             f"  {f'{least:.2f} m' if least is not None else '-':<15}  {flight.result.time_s:4.1f} s"
             f"  {flight.lost_s:5.2f} s at most  {flight.passed['onward']:6d} {flight.passed['back']:5d}"
             f"     {flight.result.reason}"

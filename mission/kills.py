@@ -1,8 +1,9 @@
 """What happens when the companion dies in flight?  ``python -m mission.kills --runs 20`` kills it at random moments.
 
 Each run kills (SIGKILL) at a moment drawn over the flight, waits for the vehicle's failsafe, starts a new companion and
-gives it OFFBOARD again. Judged by the truth, in vehicle time: how soon the failsafe came after the kill, whether the
-vehicle touched anything, and how the mission ended. Every other run has COM_OBL_RC_ACT at Hold, not at PX4's default.
+gives it OFFBOARD again. Judged by the truth, in vehicle time: how soon the failsafe came after the kill, and whether
+the vehicle touched anything; and by the ground station: how the mission ended. Every other run has COM_OBL_RC_ACT at
+Hold. The others have PX4's default, Position: nobody holds the sticks, the vehicle comes down, and is sent up again.
 """
 
 import argparse
@@ -73,15 +74,15 @@ def run(name: str, seed: int, speed: float, instance: int, folder: Path) -> Kill
     plan = plan_flight(name, seed)
     rng = random.Random(f"kill {seed}")
     action = list(ACTIONS)[seed % len(ACTIONS)]
-    killed_t_s, trouble = math.nan, ""
+    killed_t_s, end_ned_m, trouble = math.nan, None, ""
     with Rig(plan, paced(speed, instance), folder) as rig:
         try:
             killed_t_s = _fly_and_kill(rig, action, rng.uniform(*FLIGHT_S))
-            _fly_on(rig, action, killed_t_s)
+            end_ned_m = _fly_on(rig, action, killed_t_s)
         except FlightError as error:
             trouble = str(error)
         rig.end()
-    return _judged(plan, folder, Kill(seed, action, killed_t_s, trouble=trouble))
+    return _judged(plan, folder, Kill(seed, action, killed_t_s, trouble=trouble), end_ned_m)
 
 
 def _fly_and_kill(rig: Rig, action: int, after_s: float) -> float:
@@ -100,20 +101,24 @@ def _fly_and_kill(rig: Rig, action: int, after_s: float) -> float:
     return killed_t_s
 
 
-def _fly_on(rig: Rig, action: int, killed_t_s: float) -> None:
-    """Wait for the failsafe, start a new companion, let it finish the mission. Raises FlightError."""
+def _fly_on(rig: Rig, action: int, killed_t_s: float) -> tuple[float, float, float]:
+    """Wait for the failsafe, start a new companion, let it finish the mission; the place. Raises FlightError."""
     pilot = rig.pilot
     if not pilot.until(lambda: pilot.custom_mode != codec.PX4_OFFBOARD, 10.0):
         raise FlightError("no failsafe")
     rig.start_companion()
     if action == HOLD:
         pilot.until(lambda: pilot.t_s >= killed_t_s + STAND_S, WALL_S)
-    pilot.hand_over()  # at once with PX4's default: nobody holds the sticks, and so it comes down
+    else:
+        pilot.until(lambda: not pilot.armed, WALL_S)
+        pilot.take_off()
+    pilot.hand_over()
     if not pilot.until(lambda: not pilot.armed, WALL_S):
         raise FlightError("the new companion did not land")
+    return pilot.pos_ned_m
 
 
-def _judged(plan: FlightPlan, folder: Path, kill: Kill) -> Kill:
+def _judged(plan: FlightPlan, folder: Path, kill: Kill, end_ned_m: tuple[float, float, float] | None) -> Kill:
     rows = list(read_rows(folder / "truth.jsonl"))
     after = [row for row in rows if row["t_s"] >= kill.killed_t_s]
     if not after:
@@ -124,8 +129,7 @@ def _judged(plan: FlightPlan, folder: Path, kill: Kill) -> Kill:
     alone = after[:back]
     clearances = [row["clearance_m"] for row in alone if row["clearance_m"] is not None]
     slow = next((row for row in alone if math.hypot(*row["vel_ned_m_s"][:2]) < 0.3), alone[-1])
-    end = np.array(rows[-1]["pos_world_ned_m"])
-    error_m = float(np.linalg.norm(end[:2] - plan.world.goal_ned_m))
+    error_m = math.dist(end_ned_m[:2], plan.task.goal_ned_m.tolist()) if end_ned_m is not None else math.inf
     return Kill(
         seed=kill.seed,
         action=kill.action,
@@ -136,7 +140,7 @@ def _judged(plan: FlightPlan, folder: Path, kill: Kill) -> Kill:
         travelled_m=float(np.linalg.norm((np.array(slow["pos_world_ned_m"]) - place)[:2])),
         min_clearance_m=min(clearances, default=math.inf),
         contact=any(row["contact"] for row in rows),
-        resumed=back is not None and not rows[-1]["armed"] and error_m <= plan.mission.success.landing_error_m,
+        resumed=error_m <= plan.mission.success.landing_error_m,
         landing_error_m=error_m,
         trouble=kill.trouble,
     )

@@ -34,6 +34,7 @@ class Pilot:
     def __init__(self, instance: int, clock: Clock | None = None) -> None:
         """Raises TransportError when somebody else has the port."""
         self.t_s = 0.0
+        self.pos_ned_m = (0.0, 0.0, 0.0)
         self.custom_mode = 0
         self.armed = self.ready = False
         self.landed = LandedState.UNDEFINED
@@ -106,6 +107,7 @@ class Pilot:
         kind = message.get_msgId()
         if kind == mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
             self.t_s = message.time_boot_ms / 1e3
+            self.pos_ned_m = (message.x, message.y, message.z)
         elif kind == mav.MAVLINK_MSG_ID_HEARTBEAT:
             self.custom_mode = message.custom_mode
             self.armed = bool(message.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED)
