@@ -214,7 +214,8 @@ class Autopilot:
         by_stream = self.user_mode is FlightMode.OFFBOARD and not self._stream.needs_position
         chosen, self._mode_chosen = self._mode_chosen, False
         armed_for_s = self.t_s - self.armed_s
-        facts = Facts(self.t_s, self.armed, self.user_mode, armed_for_s, chosen, lost, not (blind or by_stream))
+        needs_position = not (blind or by_stream)
+        facts = Facts(self.t_s, self.armed, self.user_mode, armed_for_s, chosen, lost, needs_position=needs_position)
         failsafe = self._navigator.failsafe(state, self.landed, facts)
         if failsafe == self.failsafe or not self.armed:
             return
