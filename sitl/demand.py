@@ -12,6 +12,9 @@ import numpy as np
 
 from companion.core.types import F64
 
+_NO_AXES: Final = np.full(3, math.nan)
+_NO_AXES.flags.writeable = False
+
 
 class Loop(Enum):
     """Which control loop a demand enters."""
@@ -23,8 +26,8 @@ class Loop(Enum):
 
 
 def no_axes() -> F64:
-    """(3,) of NaN: nothing asked on any axis."""
-    return np.full(3, math.nan)
+    """(3,) of NaN: nothing asked on any axis. Always the same, read-only."""
+    return _NO_AXES
 
 
 @dataclass(frozen=True, slots=True, eq=False)

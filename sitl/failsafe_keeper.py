@@ -42,6 +42,8 @@ class FailsafeKeeper:
         if facts.mode_changed or self._taken_over:
             self._drop(Clears.ON_MODE_CHANGE)
         found = responses(facts, self._params)
+        if not (found or self._standing or self._taken_over or self.action):
+            return self.action  # nothing is wrong, nothing was
         warned = self._merge(found, facts.t_s)
         before, delayed = self.action, False
         if before > Action.HOLD or self._taken_over:

@@ -84,20 +84,26 @@ class Guardian:
         self._watch_fence(state, facts.armed)
         self._watch_charge(facts.armed)
         self._watch_attitude(state, facts.armed)
-        action = self._keeper.update(
-            replace(
-                facts,
-                gcs_lost=self._gcs_lost or self.gcs_blocked,
-                breached=self.breach is not None,
-                charge=self.charge,
-                attitude_failed=self._attitude_failed,
-                position_ok=self.position_ok,
-                attitude_ok=self.attitude_ok,
-            )
-        )
+        action = self._keeper.update(facts if self._all_well() else self._completed(facts))
         if self._keeper.text is not None:
             self._say(StatusText(CRITICAL, self._keeper.text))
         return action
+
+    def _all_well(self) -> bool:
+        """Nothing to add to the commander's facts? Nearly always: building them anew would be the dearest step here."""
+        told = self.position_ok and self.attitude_ok and not (self._gcs_lost or self.gcs_blocked)
+        return told and self.charge is Charge.FINE and self.breach is None and not self._attitude_failed
+
+    def _completed(self, facts: Facts) -> Facts:
+        return replace(
+            facts,
+            gcs_lost=self._gcs_lost or self.gcs_blocked,
+            breached=self.breach is not None,
+            charge=self.charge,
+            attitude_failed=self._attitude_failed,
+            position_ok=self.position_ok,
+            attitude_ok=self.attitude_ok,
+        )
 
     def _watch_fence(self, state: VehicleState, armed: bool) -> None:
         breach = (
@@ -120,16 +126,17 @@ class Guardian:
     def _watch_attitude(self, state: VehicleState, armed: bool) -> None:
         """PX4's failure detector: too much roll or pitch for too long."""
         roll_rad, pitch_rad, _ = euler_rad(state.q_ned_frd)
-        limits = (self._params["FD_FAIL_R"], self._params["FD_FAIL_P"])
-        tilted = any(
-            limit_deg > 0 and abs(angle) > math.radians(limit_deg)
-            for angle, limit_deg in zip((roll_rad, pitch_rad), limits, strict=True)
-        )
+        tilted = _beyond(roll_rad, self._params["FD_FAIL_R"]) or _beyond(pitch_rad, self._params["FD_FAIL_P"])
         self._tilted_since_s = min(self._tilted_since_s, state.t_s) if tilted and armed else math.inf
         failed = state.t_s - self._tilted_since_s >= TILTED_FOR_S
         if failed and not self._attitude_failed:
             self._say(StatusText(CRITICAL, "Attitude failure detected"))
         self._attitude_failed = failed
+
+
+def _beyond(angle_rad: float, limit_deg: float) -> bool:
+    """Past a limit; 0 is none."""
+    return limit_deg > 0 and abs(angle_rad) > math.radians(limit_deg)
 
 
 def _charge(remaining: float, params: ParamStore) -> Charge:

@@ -165,7 +165,7 @@ class Vehicle:
 
     def truth(self) -> Truth:
         """Read everything at this instant."""
-        n, e, d, vn, ve, vd, phi, theta, psi, p, q, r, fx, fy, fz, thrust_lbs = (get() for get in self._get)
+        n, e, d, vn, ve, vd, phi, theta, psi, p, q, r, fx, fy, fz, thrust_lbs = [get() for get in self._get]
         to_acc = LB_N / MASS_KG
         return Truth(
             self.t_s,
@@ -174,7 +174,7 @@ class Vehicle:
             quaternion(phi, theta, wrap_rad(psi)),
             np.array((p, q, r)),
             np.array((fx * to_acc, fy * to_acc, fz * to_acc)),
-            any(touch() != 0.0 for touch in self._touch),
+            any(touch() for touch in self._touch),
             thrust_lbs * LB_N / FULL_THRUST_N,
         )
 

@@ -15,7 +15,7 @@ def wrap_rad(angle_rad: float) -> float:
 
 def rotation_ned_frd(q_ned_frd: F64) -> F64:
     """Rotation matrix (3, 3) that takes frd vectors to ned."""
-    w, x, y, z = (float(c) for c in q_ned_frd)
+    w, x, y, z = q_ned_frd.tolist()
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -27,7 +27,7 @@ def rotation_ned_frd(q_ned_frd: F64) -> F64:
 
 def euler_rad(q_ned_frd: F64) -> tuple[float, float, float]:
     """Roll, pitch, yaw (Z-Y-X, radians)."""
-    w, x, y, z = (float(c) for c in q_ned_frd)
+    w, x, y, z = q_ned_frd.tolist()
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
     yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
