@@ -32,6 +32,7 @@ SLACK_S: Final = 0.5  # the failsafe has to be there by then
 BRAKE_M_S2: Final = 3.0  # of the vehicle in Hold, carefully
 LOOK_M: Final = 30.0
 STEP_M: Final = 0.05
+STANDS_M_S: Final = 0.3  # in gusts it never stands stiller than this
 HOLD: Final = 5
 ACTIONS: Final = {0: "Position", HOLD: "Hold"}  # COM_OBL_RC_ACT
 STAND_S: Final = 5.0  # after a kill the vehicle stands by then
@@ -128,7 +129,7 @@ def _judged(plan: FlightPlan, folder: Path, kill: Kill, end_ned_m: tuple[float, 
     back = next((i for i, row in enumerate(after) if left is not None and i > left and row["mode"] == "OFFBOARD"), None)
     alone = after[:back]
     clearances = [row["clearance_m"] for row in alone if row["clearance_m"] is not None]
-    slow = next((row for row in alone if math.hypot(*row["vel_ned_m_s"][:2]) < 0.3), alone[-1])
+    slow = next((row for row in alone if math.hypot(*row["vel_ned_m_s"][:2]) < STANDS_M_S), alone[-1])
     error_m = math.dist(end_ned_m[:2], plan.task.goal_ned_m.tolist()) if end_ned_m is not None else math.inf
     return Kill(
         seed=kill.seed,

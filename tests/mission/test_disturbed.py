@@ -7,7 +7,7 @@ import pytest
 
 from mission.bad_radio import fly
 from mission.flight_plan import plan_flight
-from mission.kills import LOSS_S, SLACK_S, kills, table
+from mission.kills import LOSS_S, SLACK_S, STANDS_M_S, kills, table
 from mission.relay import BAD_RADIO
 from mission.simulate import sim_config, ticks
 from sitl.modes import FlightMode
@@ -33,7 +33,7 @@ def test_a_companion_that_falls_silent_in_flight_leaves_a_vehicle_in_its_failsaf
     while sim.t_s < silent_s + STAND_S:
         sim.advance_to_scan()
     assert not sim.contact
-    assert abs(sim.state.vel_ned_m_s).max() < 0.1
+    assert abs(sim.state.vel_ned_m_s).max() < STANDS_M_S
 
 
 @pytest.mark.slow
