@@ -6,14 +6,14 @@ own failures end in a hold: a scan that stops, an exception in the tick, a reque
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from pymavlink.dialects.v20 import common as mav
 
 from companion.app.config import CompanionConfig, Engage
 from companion.app.logs import FlightLogs
-from companion.app.session import Answer, HoldReason, Navigator, Session, decided, is_flying
+from companion.app.session import HoldReason, Navigator, Session, decided, is_flying
 from companion.app.signals import StopRequest
 from companion.app.status import ExitCode, StatusLine, status_line
 from companion.app.watch import ModeRequest, VehicleWatch, may_engage, scan_lost
@@ -170,25 +170,27 @@ class Companion:
         began_s = self._clock.now_s()
         try:
             answer = session.tick(inputs)
+            ticked_s = self._clock.now_s()
+            self._send(answer.setpoint)
+            sent_s = self._clock.now_s()
+            row = answer.row
         except Exception as error:  # the one place: whatever the tick trips over must end in a hold, not in a fall
             self._tick_failed(error, inputs)
             return
-        ticked_s = self._clock.now_s()
-        self._send(answer.setpoint)
         timing = {
             "t_s": inputs.scan.t_s,
             "wall_s": arrived_s,
             "tick_ms": (ticked_s - began_s) * 1e3,
-            "loop_ms": (self._clock.now_s() - arrived_s) * 1e3,
-            "decision": decided(answer.row),
+            "loop_ms": (sent_s - arrived_s) * 1e3,
+            "decision": decided(row),
         }
-        self._keep(answer, timing)
+        self._keep(row, timing)
         if answer.over:
             self._finish(ExitCode.LANDED, "landed and disarmed")
 
-    def _keep(self, answer: Answer, timing: dict[str, Any]) -> None:
-        self._logs.tick(answer.row, timing)
-        self._status = status_line(answer.row, timing["tick_ms"])
+    def _keep(self, row: Mapping[str, Any], timing: dict[str, Any]) -> None:
+        self._logs.tick(row, timing)
+        self._status = status_line(row, timing["tick_ms"])
 
     def _tick_failed(self, error: Exception, inputs: Inputs) -> None:
         self._logs.event("navigator failed", exc_info=True, t_s=inputs.scan.t_s)

@@ -44,8 +44,13 @@ class Answer:
     """What one tick gives."""
 
     setpoint: Setpoint
-    row: Mapping[str, Any]  # the record
+    record: TickRecord
     over: bool  # the vehicle has flown and is disarmed: nothing more to answer
+
+    @property
+    def row(self) -> Mapping[str, Any]:
+        """The record as it is logged; made when asked for, so that the setpoint does not wait for it."""
+        return self.record.as_dict()
 
 
 class Session:
@@ -73,7 +78,7 @@ class Session:
         self._memory, setpoint, record = self._navigator.tick(self._memory, inputs, self._task, self._params)
         if not _is_finite(setpoint):
             raise ValueError(f"setpoint is not finite: {setpoint}")
-        return Answer(setpoint, record.as_dict(), over=self.engaged and not inputs.status.armed)
+        return Answer(setpoint, record, over=self.engaged and not inputs.status.armed)
 
     def hold(self, reason: HoldReason) -> None:
         """From now on hold; where, is decided by the next state."""

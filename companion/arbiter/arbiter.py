@@ -103,7 +103,7 @@ def _advanced(state: ArbiterState, t_s: float, elapsed_s: float) -> ArbiterState
 def _wished(state: ArbiterState, mode: NavMode, elapsed_s: float, params: ArbiterParams) -> ArbiterState:
     """Count the wish. One tick stands for one scan period at most: neither a gap nor a burst shortens the debounce."""
     if mode == state.mode:
-        return replace(state, wish=None, wish_ticks=0, wish_s=0.0)
+        return state if state.wish is None else replace(state, wish=None, wish_ticks=0, wish_s=0.0)
     credit_s = min(elapsed_s, params.debounce_s / params.debounce_ticks)
     if mode != state.wish:
         return replace(state, wish=mode, wish_ticks=1, wish_s=credit_s)

@@ -7,7 +7,7 @@ all of it is painted. Certification clears a hit at once, so what moves is forgo
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -89,7 +89,7 @@ def update(grid: GridMap, scan: PolarScan, params: MapParams) -> GridMap:
     hit_t = grid.hit_t * (1.0 - certain)
     hit_ne_m = grid.hit_ne_m.copy()
     moved_ne_m = _paint(grid, free_t, hit_t, hit_ne_m, scan, params)
-    return replace(grid, free_t=free_t, hit_t=hit_t, hit_ne_m=hit_ne_m, moved_ne_m=moved_ne_m)
+    return GridMap(grid.cell_m, grid.corner, free_t, hit_t, hit_ne_m, moved_ne_m)
 
 
 def occupied(grid: GridMap, t_s: float, params: MapParams) -> NDArray[np.bool_]:
