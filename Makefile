@@ -61,10 +61,11 @@ format: $(VENV)/.dev
 	$(BIN)/ruff check --fix .
 
 test: check
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest -n 2 -m "not slow and not live"
+	$(BIN)/pytest -m "live and not slow" --reruns 2
 
 slow: $(VENV)/.dev
-	$(BIN)/pytest -n 2 -m slow --timeout 3600
+	$(BIN)/pytest -m slow --timeout 3600
 
 tables: $(VENV)/.sitl
 	@missed=0; for table in trajectory1 trajectory2 trajectory1_movers forest100; do \

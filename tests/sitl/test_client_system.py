@@ -72,6 +72,7 @@ def test_mavsdk_downloads_the_log_of_a_flight(tmp_path: Path) -> None:
         await asyncio.sleep(0.6)
         await pilot.action.disarm()
         await pilot.until(lambda: not pilot.armed)
+        await asyncio.sleep(1.0)  # the disarm ends the log
         logs = LogFilesAsync(pilot.system)
         entries = await logs.get_entries()
         assert [e.id for e in entries] == [0]

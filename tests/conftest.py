@@ -1,0 +1,40 @@
+"""Which tests need the machine for themselves? Those with real ports, processes and clocks: marked ``live``.
+
+They run one after another, after the rest has run side by side, and get another try where a busy machine made a real
+clock run out (see ``make test``).
+"""
+
+import pytest
+
+LIVE = {
+    "test_attack",
+    "test_bad_radio",
+    "test_cli",
+    "test_client_steering",
+    "test_client_system",
+    "test_companion_app_process",
+    "test_companion_serial",
+    "test_disturbed",
+    "test_lidar",
+    "test_mission_mavsdk",
+    "test_mission_server",
+    "test_operator",
+    "test_preflight_vehicle",
+    "test_px4_bridge",
+    "test_reconnect",
+    "test_runner",
+    "test_same_record",
+    "test_server",
+    "test_server_fuzz",
+    "test_server_process",
+    "test_server_setpoints",
+    "test_ten_rules",
+    "test_transport",
+}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark by file: what opens ports in one of its tests does so in most."""
+    for item in items:
+        if item.path.stem in LIVE:
+            item.add_marker(pytest.mark.live)
