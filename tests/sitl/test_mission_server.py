@@ -71,7 +71,7 @@ def test_a_mission_is_flown_and_its_news_are_repeated(operator: Client) -> None:
 
 def test_mission_current_comes_every_second_on_every_link(operator: Client, ground: Client) -> None:
     for client in (operator, ground):
-        client.seen.clear()
+        client.drain()
         client.message("MISSION_CURRENT")
         began_s = time.monotonic()
         for _ in range(3):

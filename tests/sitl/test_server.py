@@ -82,6 +82,13 @@ class Client:
         self.seen += new
         return new
 
+    def drain(self) -> None:
+        """Forget everything that has arrived so far."""
+        while self.poll(0.0):
+            pass
+        self.seen.clear()
+        self._unread.clear()
+
     def until(self, wanted: Callable[[Any], bool], limit_s: float = 10.0) -> Any:
         deadline_s = time.monotonic() + limit_s
         while time.monotonic() < deadline_s:
