@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from pymavlink.dialects.v20 import common as mav
 
+from companion.core.mavlink import Parcel
 from sitl import messages
 from sitl.home import Home
 from sitl.link import Link
@@ -22,10 +23,10 @@ SCAN: Final = mav.MAVLINK_MSG_ID_OBSTACLE_DISTANCE  # to the companion with ever
 
 @dataclass(frozen=True, slots=True)
 class ScanBundle:
-    """The companion's inputs of one scan instant, the scan last."""
+    """The companion's inputs of one scan instant, the scan last; packed already."""
 
     t_ms: int
-    messages: tuple[Message, ...]
+    parcel: Parcel | None  # None: there is no link to a companion
 
 
 class Voice:
@@ -43,19 +44,19 @@ class Voice:
 
     def bundle(self, with_status: bool) -> ScanBundle:
         """What goes to the companion with the scan taken now; ``with_status``: HEARTBEAT and EXTENDED_SYS_STATE too."""
-        sim = self._sim
+        sim, link = self._sim, self._companion
+        if link is None:
+            return ScanBundle(sim.t_ms, None)
         status = (messages.heartbeat(sim), messages.extended_sys_state(sim)) if with_status else ()
         state = (messages.attitude_quaternion(sim), messages.local_position_ned(sim))
-        return ScanBundle(sim.t_ms, (*status, *state, messages.obstacle_distance(sim)))
+        scan = (messages.obstacle_distance(sim),) if link.wall.interval_us(SCAN) else ()
+        return ScanBundle(sim.t_ms, link.connection.pack(*status, *state, *scan))
 
     def deliver(self, bundle: ScanBundle) -> None:
         """To the companion, in one datagram."""
-        link = self._companion
-        if link is None:
-            return
-        link.vehicle.sent(NAVIGATION, bundle.t_ms * 1000)
-        wanted = bool(link.wall.interval_us(SCAN))
-        link.connection.send(*(bundle.messages if wanted else bundle.messages[:-1]))
+        if self._companion is not None and bundle.parcel is not None:
+            self._companion.vehicle.sent(NAVIGATION, bundle.t_ms * 1000)
+            self._companion.connection.send_parcel(bundle.parcel)
 
     def stream_by_wall(self, now_us: int) -> None:
         """What is due by wall time, on every link."""

@@ -7,7 +7,7 @@ nothing but start bytes must not keep us from our work.
 
 import re
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import common as mav
 
@@ -135,6 +135,14 @@ class PacketLog(Protocol):
         """Keep one packet."""
 
 
+class Parcel(NamedTuple):
+    """Messages packed before it is time to send them."""
+
+    messages: tuple[Message, ...]
+    packets: tuple[bytes, ...]
+    sequence: int  # number of the first packet
+
+
 class Connection:
     """A transport that speaks MAVLink 2 under one system and component id, with an optional log."""
 
@@ -162,17 +170,30 @@ class Connection:
 
     def send(self, *messages: Message) -> None:
         """Send messages as one chunk (one datagram on UDP)."""
-        chunk = b""
+        self.send_parcel(self.pack(*messages))
+
+    def pack(self, *messages: Message) -> Parcel:
+        """Messages made ready for ``send_parcel``."""
+        packets, sequence = [], self._mavlink.seq
         for message in messages:
             if self._signing is not None:
                 self._signing.prepare(self._mavlink)
-            packet = message.pack(self._mavlink)
+            packets.append(bytes(message.pack(self._mavlink)))
             self._mavlink.seq = (self._mavlink.seq + 1) % SEQUENCES
-            if self._log is not None:
-                self._log.write(self._clock.wall_us(), packet)
-            chunk += packet
-        self.counts.sent += len(messages)
-        self.transport.send(chunk)
+        self._mavlink.seq = sequence
+        return Parcel(messages, tuple(packets), sequence)
+
+    def send_parcel(self, parcel: Parcel) -> None:
+        """Send as one chunk; packed anew when something else was sent since, so that the numbers stay in order."""
+        if parcel.sequence != self._mavlink.seq:
+            parcel = self.pack(*parcel.messages)
+        if self._log is not None:
+            wall_us = self._clock.wall_us()
+            for packet in parcel.packets:
+                self._log.write(wall_us, packet)
+        self._mavlink.seq = (parcel.sequence + len(parcel.packets)) % SEQUENCES
+        self.counts.sent += len(parcel.packets)
+        self.transport.send(b"".join(parcel.packets))
 
     def relay(self, message: Message) -> Message:
         """Send a message that we take in ourselves, too; gives it as the other end reads it: rounded, with our ids."""
