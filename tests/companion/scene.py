@@ -110,11 +110,6 @@ def bytes_of(value: Any) -> bytes:
     return repr(value).encode()
 
 
-@functools.cache
-def plan(mission: str, seed: int) -> FlightPlan:
-    return plan_flight(mission, seed)
-
-
 @dataclass(frozen=True)
 class Flight:
     """A flight flown once a test run. A record holds its maps only in ``samples``: all of them fill 300 MB."""
