@@ -1,68 +1,77 @@
 """How quick is all this on this machine?  Ratios to bare JSBSim stepping in the same run, so that machines compare.
 
-``bare_rtf``           JSBSim alone, the aircraft flying, seconds of flight a second of CPU time
-``in_process_rtf``     the same flight with autopilot, LiDAR (360 rays, 25 Hz, 60 obstacles) and clearance
-``in_process_ratio``   in_process_rtf over bare_rtf
-``closed_loop_rtf``    trajectory 2 with the navigator, in one process
-``udp_lockstep_rtf``   trajectory 2 over UDP: vehicle, companion and operator as processes, OFFBOARD to touchdown
-``tick_p99_ms``        of that flight's ticks in OFFBOARD without a decision; ``decision_p99_ms`` with one
-``companion_rss_mb``   most memory that the companion's process held in it
+``FIGURES`` says what each figure means. What runs in this process is measured in CPU time, bare and full in turns, and
+the median round counts; whole flights are measured by the wall, each from the command line on, and the median flight
+counts. Other work on the machine slows both: ``load`` says how much of it there was.
 """
 
 import math
 import os
 import platform
-import tempfile
 import time
-from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from companion.core.types import Setpoint
-from companion.navigator.record import STANDBY
-from mission.console import FlightConsole, LogTail
-from mission.errors import FlightError
-from mission.flight_log import read_rows
+from companion.core.types import F64, Setpoint
+from mission.bench_flights import Flown, fly_once
 from mission.flight_plan import FlightPlan, plan_flight
-from mission.runner import FlySettings, fly, free_instance
 from mission.simulate import fly_in_process
 from sitl.modes import FlightMode
 from sitl.simulation import STEP_MS, SimConfig, Simulation
 from sitl.vehicle import Turbulence, Vehicle, Wind
 from sitl.world import World
 
+FIGURES: Final = {
+    "bare_rtf": "JSBSim alone, the aircraft flying: seconds of flight a second of CPU time",
+    "in_process_rtf": "the same with autopilot, LiDAR (360 rays, 25 Hz, 60 obstacles) and clearance",
+    "in_process_ratio": "the latter over the former",
+    "closed_loop_rtf": "trajectory 2 with the navigator, in one process, a second of CPU time",
+    "udp_lockstep_rtf": "trajectory 2 over UDP: vehicle, companion and operator, OFFBOARD to the end",
+    "tick_p50_ms": "of that flight's ticks in OFFBOARD without a decision",
+    "tick_p99_ms": "of the same ticks",
+    "decision_p99_ms": "of its ticks with a decision",
+    "companion_rss_mb": "most memory that the companion held in it",
+    "first_setpoint_s": "from the command line to the first setpoint",
+    "flight_wall_s": "from the command line to its end, pictures drawn",
+    "load": "mean number of processes that wanted to run, in the minute before",
+    "python": "version",
+    "machine": "on which all this was measured",
+}
 OBSTACLES = 60
-ROUNDS = 5  # bare and full alternate; the median round counts
-STRETCH_S = 10.0  # vehicle time of one round
+ROUNDS = 25  # bare and full alternate
+STRETCH_S = 4.0  # vehicle time of one round
 SETTLE_S = 8.0  # take-off, not counted
 SPEED_M_S = 3.0
 WIND = Wind((2.0, 1.0, 0.0), Turbulence.LIGHT)
 SCAN_S = 0.04  # 25 Hz
+FLIGHTS = 3
 
 
 def measure(seed: int) -> dict[str, Any]:
-    """All figures. Raises InputError for a port in use, FlightError when the flight over UDP did not end well."""
-    instance = free_instance()
-    plan = plan_flight("trajectory2", seed)
-    bare_s, full_s = _stepping_s()
+    """All ``FIGURES``. Raises InputError for a port in use, FlightError when a flight over UDP did not end well."""
+    load = os.getloadavg()[0]
+    rounds = _rounds_s()
     return {
-        "bare_rtf": STRETCH_S / bare_s,
-        "in_process_rtf": STRETCH_S / full_s,
-        "in_process_ratio": bare_s / full_s,
-        "closed_loop_rtf": _closed_loop_rtf(plan),
-        **_over_udp(plan, instance),
+        "bare_rtf": STRETCH_S / float(np.median(rounds[:, 0])),
+        "in_process_rtf": STRETCH_S / float(np.median(rounds[:, 1])),
+        "in_process_ratio": float(np.median(rounds[:, 0] / rounds[:, 1])),
+        "closed_loop_rtf": _closed_loop_rtf(plan_flight("trajectory2", seed)),
+        **_medians([fly_once("trajectory2", seed) for _ in range(FLIGHTS)]),
+        "load": load,
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
     }
 
 
-def _stepping_s() -> tuple[float, float]:
-    """CPU time of one stretch: JSBSim alone, and the whole vehicle in its world."""
+def _medians(flights: list[Flown]) -> dict[str, float]:
+    return {name: float(np.median([getattr(flown, name) for flown in flights])) for name in Flown._fields}
+
+
+def _rounds_s() -> F64:
+    """(ROUNDS, 2) CPU time of one stretch: JSBSim alone, and the whole vehicle in its world."""
     vehicle, sim = _hovering(), _flying()
-    rounds = [(_bare_s(vehicle), _full_s(sim)) for _ in range(ROUNDS)]
-    bare_s, full_s = np.median(rounds, axis=0)
-    return float(bare_s), float(full_s)
+    return np.array([(_bare_s(vehicle), _full_s(sim, back=i % 2 == 1)) for i in range(ROUNDS)])
 
 
 def _hovering() -> Vehicle:
@@ -105,39 +114,19 @@ def _bare_s(vehicle: Vehicle) -> float:
     return time.process_time() - began_s
 
 
-def _full_s(sim: Simulation) -> float:
+def _full_s(sim: Simulation, back: bool) -> float:
+    """There along the lane, and back."""
     north_m, scans = float(sim.truth.pos_ned_m[0]), round(STRETCH_S / SCAN_S)
+    step_m = SPEED_M_S * SCAN_S * (-1 if back else 1)
     began_s = time.process_time()
     for i in range(scans):
-        place = np.array([north_m + SPEED_M_S * SCAN_S * i, 0.0, -2.5])
+        place = np.array([north_m + step_m * i, 0.0, -2.5])
         sim.advance_to_scan()
         sim.submit(Setpoint(sim.t_s, place, None, None, 0.0))
     return time.process_time() - began_s
 
 
 def _closed_loop_rtf(plan: FlightPlan) -> float:
-    began_s = time.perf_counter()
+    began_s = time.process_time()
     flight = fly_in_process(plan)
-    return flight.sim.t_s / (time.perf_counter() - began_s)
-
-
-def _over_udp(plan: FlightPlan, instance: int) -> dict[str, Any]:
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        with FlightConsole("", LogTail(folder / "navigator.jsonl"), quiet=True) as console:
-            result = fly(plan, FlySettings(instance=instance), folder, console)
-        if not result.success:
-            raise FlightError(f"the flight over UDP failed: {result.reason}")
-        steered = {row["t_s"] for row in read_rows(folder / "navigator.jsonl") if row["mode"] != STANDBY}
-        ticks = [row for row in read_rows(folder / "timing.jsonl") if row["t_s"] in steered]
-        end = next(row for row in read_rows(folder / "companion.jsonl") if row.get("event") == "end")
-    return {
-        "udp_lockstep_rtf": result.realtime_factor,
-        "tick_p99_ms": _p99([row["tick_ms"] for row in ticks if not row["decision"]]),
-        "decision_p99_ms": _p99([row["tick_ms"] for row in ticks if row["decision"]]),
-        "companion_rss_mb": end["max_rss_mb"],
-    }
-
-
-def _p99(values: list[float]) -> float | None:
-    return float(np.percentile(values, 99)) if values else None
+    return flight.sim.t_s / (time.process_time() - began_s)

@@ -16,11 +16,12 @@ def bench() -> None:
 def speed(seed: Seed = 1, json: Json = False) -> None:
     """Ratios to bare JSBSim stepping, the closed loop over UDP, the ticks, the companion's memory."""
     require_extra("sitl", "bench speed")
-    from mission.bench_speed import measure
+    from mission.bench_speed import FIGURES, measure
 
     figures = measure(seed)
     if json:
         print_json(figures)
         return
     for name, value in figures.items():
-        typer.echo(f"{name:22} {value:.3g}" if isinstance(value, float) else f"{name:22} {value}")
+        figure = f"{value:.3g}" if isinstance(value, float) else value
+        typer.echo(f"{name:17} {figure:>8}  {FIGURES[name]}")
