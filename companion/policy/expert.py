@@ -41,7 +41,6 @@ BORDER_CELLS = 2  # paths to a goal outside the map end in this rim
 SHORTEST_USEFUL_M = 3.0  # five waypoints should reach at least this far, else the chords are relaxed
 CHORD_RELAX = (1.0, 2.0, 4.0)
 CHORD_POINTS = 20  # of the path that one chord replaces, at most
-NEWS_CELLS = (30.0, 100.0, LIMIT)  # so much dearer than the old way is a new one, tried in this order: mostly the first
 UNREACHED = 4.0  # cost a cell from where a way ends to a goal on the map: that is approached as near as possible
 
 
@@ -115,17 +114,12 @@ def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) ->
         source = _nearest_open(grid, field, query.prefix_ne_m[-1])
     ahead = _straight_cells(query)
     kept = _kept(query, field, old, params)
-    straight = float(ahead.ravel()[source])
+    detour = LIMIT
     if kept is not None:
-        detours = [_path_cost(kept, query, field) / (params.keep_ratio * grid.cell_m) - straight]
-    else:
-        guess = straight if old is None else _path_cost(old, query, field, params.far_cost) / grid.cell_m
-        detours = [guess - straight + dearer for dearer in NEWS_CELLS]
-    for detour in detours:
-        cells = _cheapest(field.cost, source, ahead, detour) if detour > 0.0 else None
-        if cells is not None:
-            return _smooth(_places(cells, query), grid, field, params.sweeps)
-    return kept
+        worth = _path_cost(kept, query, field) / (params.keep_ratio * grid.cell_m)
+        detour = worth - float(ahead.ravel()[source])
+    cells = _cheapest(field.cost, source, ahead, detour) if detour > 0.0 else None
+    return kept if cells is None else _smooth(_places(cells, query), grid, field, params.sweeps)
 
 
 def _straight_cells(query: Query) -> F64:
@@ -191,12 +185,12 @@ def _kept(query: Query, field: _Field, old: F64 | None, params: ExpertParams) ->
     return None if (costs >= BLOCKED).any() else rest
 
 
-def _path_cost(path: F64, query: Query, field: _Field, most: float = BLOCKED) -> float:
-    """Cost of a path plus the straight rest to the goal, in metres; of a cell at most ``most``."""
+def _path_cost(path: F64, query: Query, field: _Field) -> float:
+    """Cost of a path plus the straight rest to the goal, in metres."""
     step = np.hypot(*(np.diff(path, axis=0).T))
     cost = _sample(query.grid, field.cost, (path[1:] + path[:-1]) / 2)
     rest = float(np.hypot(*(path[-1] - query.goal_ne_m)))
-    return float(step @ np.minimum(cost, most)) + rest
+    return float(step @ np.minimum(cost, BLOCKED)) + rest
 
 
 def _smooth(path: F64, grid: GridMap, field: _Field, sweeps: int) -> F64:
