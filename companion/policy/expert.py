@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.core.geometry import arc_lengths, length, resample
+from companion.core.geometry import length, resample
 from companion.core.gridmap import NEVER, GridMap, MapParams, cells_of, centres, occupied
 from companion.core.params import param
 from companion.core.types import F64
@@ -179,7 +179,7 @@ def _kept(query: Query, field: _Field, old: F64 | None, params: ExpertParams) ->
     if np.hypot(*offset[nearest]) > 2 * query.grid.cell_m or nearest >= len(old) - 2:
         return None
     rest = np.concatenate([query.prefix_ne_m[-1][None], old[nearest + 1 :]])
-    if not _arrives(rest, query) and (arc_lengths(rest)[-1] < params.length_m or _on_map(query.grid, query.goal_ne_m)):
+    if not _arrives(rest, query) and (length(rest) < params.length_m or _on_map(query.grid, query.goal_ne_m)):
         return None  # it ended where the map once did, or where the goal could not be reached: look on
     costs = _sample(query.grid, field.cost, rest)
     return None if (costs >= BLOCKED).any() else rest
@@ -196,12 +196,13 @@ def _path_cost(path: F64, query: Query, field: _Field) -> float:
 def _smooth(path: F64, grid: GridMap, field: _Field, sweeps: int) -> F64:
     """Elastic band: pull every point to the middle of its neighbours while its clearance allows it."""
     path = path.copy()
-    inner = path[1:-1]
-    floor = np.minimum(_sample(grid, field.clearance_m, inner), field.hard_m + 2 * grid.cell_m) - grid.cell_m / 4
-    for _ in range(sweeps if len(inner) else 0):
-        moved = 0.5 * inner + 0.25 * (path[2:] + path[:-2])
+    floor = np.minimum(_sample(grid, field.clearance_m, path), field.hard_m + 2 * grid.cell_m) - grid.cell_m / 4
+    for _ in range(sweeps if len(path) > 2 else 0):
+        moved = path.copy()
+        moved[1:-1] = 0.5 * path[1:-1] + 0.25 * (path[2:] + path[:-2])
         fine = _sample(grid, field.clearance_m, moved) >= floor
-        np.copyto(inner, moved, where=fine[:, None])
+        fine[0] = fine[-1] = True
+        path = np.where(fine[:, None], moved, path)
     return path
 
 
@@ -258,8 +259,8 @@ def _at(grid: GridMap, values: F64, point_ne_m: F64) -> float:
 def _sample(grid: GridMap, values: F64, points_ne_m: F64) -> F64:
     n = values.shape[0]
     cells = np.floor(points_ne_m / grid.cell_m).astype(np.intp) - np.array(grid.corner)
-    np.minimum(np.maximum(cells, 0, out=cells), n - 1, out=cells)
-    sampled: F64 = values.take(cells[:, 0] * n + cells[:, 1])
+    np.clip(cells, 0, n - 1, out=cells)
+    sampled: F64 = values[cells[:, 0], cells[:, 1]]
     return sampled
 
 
