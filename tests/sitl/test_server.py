@@ -64,7 +64,6 @@ class Client:
 
     def __init__(self, local_port: int, vehicle_port: int, system: int = 245, component: int = 190) -> None:
         self.seen: list[Any] = []
-        self._unread: list[Any] = []  # arrived together with what the last ``until`` waited for
         self._connection = Connection(
             Udp("client", ("127.0.0.1", local_port), ("127.0.0.1", vehicle_port)), system, component
         )
@@ -87,15 +86,12 @@ class Client:
         while self.poll(0.0):
             pass
         self.seen.clear()
-        self._unread.clear()
 
     def until(self, wanted: Callable[[Any], bool], limit_s: float = 10.0) -> Any:
         deadline_s = time.monotonic() + limit_s
         while time.monotonic() < deadline_s:
-            batch, self._unread = [*self._unread, *self.poll()], []
-            for index, message in enumerate(batch):
+            for message in self.poll():
                 if wanted(message):
-                    self._unread = batch[index + 1 :]
                     return message
         raise AssertionError(f"not seen in {limit_s} s: {self.texts()}")
 
