@@ -62,7 +62,7 @@ format: $(VENV)/.dev
 
 test: check
 	$(BIN)/pytest -n 2 -m "not slow and not live"
-	$(BIN)/pytest -m "live and not slow" --reruns 2
+	$(BIN)/pytest -m "live and not slow" --reruns 3 --reruns-delay 1
 
 slow: $(VENV)/.dev
 	$(BIN)/pytest -m slow --timeout 3600
