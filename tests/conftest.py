@@ -4,7 +4,14 @@ They run one after another, after the rest has run side by side, and get another
 clock run out (see ``make test``).
 """
 
+import os
+
 import pytest
+from hypothesis import settings
+
+settings.register_profile("ci", derandomize=True)
+if os.environ.get("CI"):  # the same examples every time; new ones are looked for at the desk
+    settings.load_profile("ci")
 
 LIVE = {
     "test_attack",
