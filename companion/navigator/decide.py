@@ -1,4 +1,4 @@
-"""Which polyline does RL mode fly next? Ask the policy, let the checker decide; pure; local NED."""
+"""Which polyline does RL mode fly next? When to ask the policy, what, and what the checker says; pure; local NED."""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,10 +17,18 @@ from companion.navigator.params import Params
 from companion.perception.observation import observation
 from companion.perception.perceive import Percept, representatives
 from companion.policy.expert import ExpertParams, GeometricExpert
-from companion.policy.interface import Policy, Query
+from companion.policy.interface import Policy, Proposal, Query
 
 ESCAPE_M = 2.0  # length of the escape segment into the widest free sector
 ESCAPE_WAYS = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What the policy said."""
+
+    proposal: Proposal | None
+    memory: F64 | None  # what it wants to see again
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,42 +54,49 @@ def due(engaged: Engagement, state: VehicleState, percept: Percept, task: Task, 
     return used_up or not recheck(path.vertices_ne_m, path.s_m, percept.points_ne_m, radius_m)
 
 
-def decide(
-    memory: Memory, engaged: Engagement, state: VehicleState, percept: Percept, task: Task, params: Params
-) -> tuple[Memory, Engagement, Decision]:
-    """Ask once; the accepted path, or None (brake and hold), goes into the engagement."""
-    prefix = _prefix(engaged, state, params)
+def question(engaged: Engagement, state: VehicleState, percept: Percept, task: Task, params: Params) -> Query:
+    """What a policy is asked."""
     obstacles_ne_m = representatives(percept.bearing_range_m, state, params.perception.sense_radius_m)
-    query = Query(
+    return Query(
         state,
         task.goal_ned_m,
         percept.grid,
         percept.hazard_ne_m,
         params.vehicle.radius_m,
-        prefix,
+        _prefix(engaged, state, params),
         observation(state, obstacles_ne_m, engaged.start_ne_m, task.goal_ned_m),
     )
-    proposal, remembered = policy_named(params.policy.name, params).propose(query, memory.policy)
-    memory = replace(memory, policy=remembered, decisions=memory.decisions + 1)
-    engaged = replace(engaged, tried_t_s=state.t_s)
-    waypoints = None if proposal is None else proposal.waypoints_ne_m
+
+
+def ask(query: Query, memory: F64 | None, params: Params) -> Answer:
+    """The policy that the parameters name, asked once. Raises ParamError with the nearest name."""
+    return Answer(*policy_named(params.policy.name, params).propose(query, memory))
+
+
+def settle(
+    memory: Memory, engaged: Engagement, query: Query, answer: Answer, percept: Percept, params: Params
+) -> tuple[Memory, Engagement, Decision]:
+    """Let the checker judge the answer; the accepted path, or None (brake and hold), goes into the engagement."""
+    state = query.state
+    memory = replace(memory, policy=answer.memory, decisions=memory.decisions + 1)
+    waypoints = None if answer.proposal is None else answer.proposal.waypoints_ne_m
     asked = CheckQuery(
-        start_ned_m=prefix[0],
+        start_ned_m=query.prefix_ne_m[0],
         start_vel_ned_m_s=state.vel_ned_m_s[:2],
-        goal_ned_m=task.goal_ned_m,
-        radius_m=params.vehicle.radius_m,
+        goal_ned_m=query.goal_ne_m,
+        radius_m=query.radius_m,
         points_ned_m=percept.points_ne_m,
         proposal_ned_m=waypoints,
         escape_ned_m=None,
     )
     verdict = check(asked, params.checker)
     if verdict.path_ned_m is None:
-        escape = _escape(state.pos_ned_m[:2], task.goal_ned_m, percept, params)
+        escape = _escape(state.pos_ned_m[:2], query.goal_ne_m, percept, params)
         verdict = check(replace(asked, escape_ned_m=escape), params.checker)
     path = None
     if verdict.path_ned_m is not None and verdict.margin_m is not None:
         path = Path(verdict.path_ned_m, 0.0, verdict.margin_m, state.t_s)
-    return memory, replace(engaged, path=path), Decision(waypoints, verdict)
+    return memory, replace(engaged, path=path, tried_t_s=state.t_s), Decision(waypoints, verdict)
 
 
 def policy_named(name: str, params: Params) -> Policy:

@@ -1,6 +1,7 @@
 """What is the setpoint for this scan? One tick of the navigator: a pure function of memory, inputs, task, parameters.
 
-Training calls it in-process, a flight calls it over MAVLink, real firmware calls the same.
+Training calls it in-process, a flight calls it over MAVLink, real firmware calls the same. A tick has two halves:
+``sense`` ends where the policy would be asked, ``act`` goes on with the answer; training puts its own in between.
 """
 
 import math
@@ -9,50 +10,38 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from companion.arbiter import arbiter
-from companion.arbiter.facts import Facts, Thresholds, landing_safe, thresholds
+from companion.arbiter.facts import Facts, Thresholds, thresholds
 from companion.core import gridmap
 from companion.core.frames import yaw_rad
 from companion.core.inputs import Inputs
 from companion.core.task import Task
 from companion.core.types import AutopilotStatus, LandedState, NavMode, Setpoint, VehicleState
-from companion.guidance import landing, limits, line
+from companion.guidance import landing, line
 from companion.navigator.believe import believable, stand_in
-from companion.navigator.decide import Decision, decide, due
+from companion.navigator.decide import Answer, ask, due, question
 from companion.navigator.memory import Engagement, Memory
+from companion.navigator.modes import Scene, steer
 from companion.navigator.params import Params
 from companion.navigator.record import Record
-from companion.navigator.track import Route, Tracked, course_along, track, turned
 from companion.perception.perceive import Percept, Remembered, perceive
+from companion.policy.interface import Query
 
 
 @dataclass(frozen=True, slots=True)
-class _Scene:
-    """Everything one tick knows and does not change."""
+class Pending:
+    """A tick up to the question for the policy."""
 
-    state: VehicleState
-    percept: Percept
-    task: Task
-    params: Params
-    limits: Thresholds
-    facts: Facts
-    dt_s: float
-    ground_down_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Steered:
-    """What a mode makes of the tick."""
-
+    query: Query | None  # None: no decision is due, ``act`` needs no answer
     memory: Memory
-    engaged: Engagement
-    setpoint: Setpoint
-    tracked: Tracked | None = None
-    decision: Decision | None = None
-    touchdown: bool = False
+    inputs: Inputs
+    percept: Percept
+    goal_m: float
+    engaged: Engagement | None  # None: not ours to fly
+    scene: Scene | None
 
 
 def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Memory, Setpoint, Record]:
-    """One scan in, one setpoint out.
+    """One scan in, one setpoint out; the policy that the parameters name is asked where a decision is due.
 
     Args:
         memory: what the last tick returned, ``memory.start`` at first.
@@ -63,6 +52,12 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
     Returns:
         The next memory, the setpoint that answers the scan, and the record of the tick.
     """
+    pending = sense(memory, inputs, task, params)
+    return act(pending, None if pending.query is None else ask(pending.query, pending.memory.policy, params))
+
+
+def sense(memory: Memory, inputs: Inputs, task: Task, params: Params) -> Pending:
+    """The first half of a tick: perceive, let the arbiter decide who flies, and put the question where one is due."""
     known = believable(inputs)
     if not known:
         inputs = stand_in(inputs, memory.state, memory.t_s)
@@ -82,27 +77,43 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
         memory = replace(memory, state=state, ground_down_m=_ground(memory, inputs))
     goal_m = _goal_distance(state, task)
     if not (inputs.status.offboard and inputs.status.armed) or memory.state is None:
-        memory, setpoint = _standby(memory, state)
-        return memory, setpoint, Record(inputs, percept, memory, setpoint, goal_m)
+        return Pending(None, memory, inputs, percept, goal_m, None, None)
     engaged = memory.engaged or _engage(state, task)
     facts = _facts(inputs, percept, engaged, goal_m)
-    scene = _Scene(state, percept, task, params, _thresholds(percept, params), facts, dt_s, memory.ground_down_m)
+    scene = Scene(state, percept, task, params, _thresholds(percept, params), facts, dt_s, memory.ground_down_m)
     engaged = _arbitrated(engaged, scene)
-    steered = _steer(memory, engaged, scene)
+    query = None
+    if engaged.arbiter.mode == NavMode.RL and not engaged.arbiter.hold and due(engaged, state, percept, task, params):
+        query = question(engaged, state, percept, task, params)
+    return Pending(query, memory, inputs, percept, goal_m, engaged, scene)
+
+
+def act(pending: Pending, answer: Answer | None) -> tuple[Memory, Setpoint, Record]:
+    """The second half: ``answer`` to ``pending.query`` (None exactly where that is None), checked and flown."""
+    if (answer is None) != (pending.query is None):
+        raise ValueError("an answer is needed exactly where a query was put")
+    memory, inputs, percept, engaged, scene = (
+        pending.memory, pending.inputs, pending.percept, pending.engaged, pending.scene,
+    )  # fmt: skip
+    if engaged is None or scene is None:
+        memory, setpoint = _standby(memory, inputs.state)
+        return memory, setpoint, Record(inputs, percept, memory, setpoint, pending.goal_m)
+    asked = None if pending.query is None or answer is None else (pending.query, answer)
+    steered = steer(memory, engaged, scene, asked)
     yaw_sp = memory.yaw_sp_rad if steered.setpoint.yaw_rad is None else steered.setpoint.yaw_rad
     memory = replace(steered.memory, engaged=steered.engaged, yaw_sp_rad=yaw_sp)
     flown_s = steered.engaged.arbiter.t_s - engaged.engaged_t_s
-    bound = arbiter.switch_bound(flown_s, params.arbiter, steered.engaged.arbiter.aborts)
+    bound = arbiter.switch_bound(flown_s, scene.params.arbiter, steered.engaged.arbiter.aborts)
     record = Record(
         inputs,
         percept,
         memory,
         steered.setpoint,
-        goal_m,
+        pending.goal_m,
         bound,
         steered.tracked,
         steered.decision,
-        line.errors(steered.engaged.line, state.pos_ned_m[:2], yaw_rad(state.q_ned_frd)),
+        line.errors(steered.engaged.line, inputs.state.pos_ned_m[:2], yaw_rad(inputs.state.q_ned_frd)),
         steered.touchdown,
     )
     return memory, steered.setpoint, record
@@ -156,7 +167,7 @@ def _thresholds(percept: Percept, params: Params) -> Thresholds:
     return thresholds(params.arbiter, d_scale=percept.scale)
 
 
-def _arbitrated(engaged: Engagement, scene: _Scene) -> Engagement:
+def _arbitrated(engaged: Engagement, scene: Scene) -> Engagement:
     """Let the arbiter decide, and set up what the new mode starts from."""
     before = engaged.arbiter
     after = arbiter.decide(before, scene.facts, scene.limits, scene.params.arbiter)
@@ -170,79 +181,6 @@ def _arbitrated(engaged: Engagement, scene: _Scene) -> Engagement:
         return replace(engaged, path=None, landing=None)
     began = landing.start(scene.state, scene.task.goal_ned_m, scene.ground_down_m, engaged.down_m)
     return replace(engaged, path=None, landing=began)
-
-
-def _steer(memory: Memory, engaged: Engagement, scene: _Scene) -> _Steered:
-    """The setpoint of the mode; braking and holding come first."""
-    if engaged.arbiter.hold:
-        return _held(memory, engaged, scene)
-    if engaged.arbiter.mode == NavMode.LANDING:
-        return _land(memory, engaged, scene)
-    if engaged.arbiter.mode == NavMode.TRAVEL:
-        return _travel(memory, engaged, scene)
-    return _replan(memory, engaged, scene)
-
-
-def _held(memory: Memory, engaged: Engagement, scene: _Scene) -> _Steered:
-    stop, setpoint = limits.hold(scene.state, engaged.stop, memory.yaw_sp_rad, scene.params.limits)
-    return _Steered(memory, replace(engaged, stop=stop), setpoint)
-
-
-def _travel(memory: Memory, engaged: Engagement, scene: _Scene) -> _Steered:
-    """Along the frozen line, course corrected by the line law."""
-    if _must_stop(scene):
-        return _held(memory, engaged, scene)
-    state, params = scene.state, scene.params
-    vertices = np.stack([engaged.line.origin_ned_m, engaged.line.goal_ned_m])
-    speed = math.hypot(state.vel_ned_m_s[0], state.vel_ned_m_s[1])
-    course = line.course_rad(engaged.line, state.pos_ned_m[:2], speed, params.line)
-    route = Route(vertices, engaged.line_s_m, scene.task.cruise_m_s, engaged.down_m, params.vehicle.corridor_m, course)
-    yaw = turned(memory.yaw_sp_rad, engaged.line.course_rad, scene.dt_s, params.vehicle.yaw_rate_rad_s)
-    tracked = track(route, state, scene.percept, yaw, params)
-    engaged = replace(engaged, line_s_m=tracked.s_m, stop=None)
-    return _Steered(memory, engaged, tracked.setpoint, tracked)
-
-
-def _replan(memory: Memory, engaged: Engagement, scene: _Scene) -> _Steered:
-    """Along the accepted polyline; a new decision where one is due; no path: brake and hold, then ask again."""
-    decision = None
-    if due(engaged, scene.state, scene.percept, scene.task, scene.params):
-        memory, engaged, decision = decide(memory, engaged, scene.state, scene.percept, scene.task, scene.params)
-    path, params = engaged.path, scene.params
-    if path is None or _must_stop(scene):
-        held = _held(memory, replace(engaged, path=None), scene)
-        return replace(held, decision=decision)
-    margin_m = min(params.vehicle.corridor_m, path.margin_m)
-    route = Route(path.vertices_ne_m, path.s_m, scene.task.cruise_m_s, engaged.down_m, margin_m)
-    course = course_along(path.vertices_ne_m, path.s_m)
-    yaw = turned(memory.yaw_sp_rad, course, scene.dt_s, params.vehicle.yaw_rate_rad_s)
-    tracked = track(route, scene.state, scene.percept, yaw, params)
-    engaged = replace(engaged, path=replace(path, s_m=tracked.s_m), stop=None)
-    return _Steered(memory, engaged, tracked.setpoint, tracked, decision)
-
-
-def _land(memory: Memory, engaged: Engagement, scene: _Scene) -> _Steered:
-    """Onto the goal; the descent pauses at once where it is not safe."""
-    assert engaged.landing is not None  # set on entry, cleared on exit
-    safe = landing_safe(scene.facts, scene.limits)
-    began, command = landing.step(engaged.landing, scene.state, safe, scene.params.landing)
-    if _must_stop(scene):
-        return _held(memory, replace(engaged, landing=began), scene)
-    yaw = turned(memory.yaw_sp_rad, command.yaw_rad, scene.dt_s, scene.params.vehicle.yaw_rate_rad_s)
-    setpoint = Setpoint(scene.state.t_s, command.pos_ned_m, command.vel_ned_m_s, command.acc_ned_m_s2, yaw)
-    engaged = replace(engaged, landing=began, stop=None)
-    return _Steered(memory, engaged, setpoint, touchdown=command.touchdown)
-
-
-def _must_stop(scene: _Scene) -> bool:
-    """Would going on as now touch something remembered before the vehicle stands?"""
-    return limits.velocity_stop_needed(
-        scene.state.pos_ned_m,
-        scene.state.vel_ned_m_s,
-        scene.percept.static_ne_m,
-        scene.params.vehicle.radius_m,
-        scene.params.limits,
-    )
 
 
 def _goal_distance(state: VehicleState, task: Task) -> float:

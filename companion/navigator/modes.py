@@ -1,0 +1,116 @@
+"""What does the mode in force make of the tick? Travel, RL, Landing, and the hold over all of them; pure; local NED."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from companion.arbiter.facts import Facts, Thresholds, landing_safe
+from companion.core.task import Task
+from companion.core.types import NavMode, Setpoint, VehicleState
+from companion.guidance import landing, limits, line
+from companion.navigator.decide import Answer, Decision, settle
+from companion.navigator.memory import Engagement, Memory
+from companion.navigator.params import Params
+from companion.navigator.track import Route, Tracked, course_along, track, turned
+from companion.perception.perceive import Percept
+from companion.policy.interface import Query
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Everything one tick knows and does not change."""
+
+    state: VehicleState
+    percept: Percept
+    task: Task
+    params: Params
+    limits: Thresholds
+    facts: Facts
+    dt_s: float
+    ground_down_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Steered:
+    """What a mode makes of the tick."""
+
+    memory: Memory
+    engaged: Engagement
+    setpoint: Setpoint
+    tracked: Tracked | None = None
+    decision: Decision | None = None
+    touchdown: bool = False
+
+
+def steer(memory: Memory, engaged: Engagement, scene: Scene, asked: tuple[Query, Answer] | None) -> Steered:
+    """The setpoint of the mode; braking and holding come first. ``asked``: what the policy said, where it was due."""
+    if engaged.arbiter.hold:
+        return _held(memory, engaged, scene)
+    if engaged.arbiter.mode == NavMode.LANDING:
+        return _land(memory, engaged, scene)
+    if engaged.arbiter.mode == NavMode.TRAVEL:
+        return _travel(memory, engaged, scene)
+    return _follow(memory, engaged, scene, asked)
+
+
+def _held(memory: Memory, engaged: Engagement, scene: Scene) -> Steered:
+    stop, setpoint = limits.hold(scene.state, engaged.stop, memory.yaw_sp_rad, scene.params.limits)
+    return Steered(memory, replace(engaged, stop=stop), setpoint)
+
+
+def _travel(memory: Memory, engaged: Engagement, scene: Scene) -> Steered:
+    """Along the frozen line, course corrected by the line law."""
+    if _must_stop(scene):
+        return _held(memory, engaged, scene)
+    state, params = scene.state, scene.params
+    vertices = np.stack([engaged.line.origin_ned_m, engaged.line.goal_ned_m])
+    speed = math.hypot(state.vel_ned_m_s[0], state.vel_ned_m_s[1])
+    course = line.course_rad(engaged.line, state.pos_ned_m[:2], speed, params.line)
+    route = Route(vertices, engaged.line_s_m, scene.task.cruise_m_s, engaged.down_m, params.vehicle.corridor_m, course)
+    yaw = turned(memory.yaw_sp_rad, engaged.line.course_rad, scene.dt_s, params.vehicle.yaw_rate_rad_s)
+    tracked = track(route, state, scene.percept, yaw, params)
+    engaged = replace(engaged, line_s_m=tracked.s_m, stop=None)
+    return Steered(memory, engaged, tracked.setpoint, tracked)
+
+
+def _follow(memory: Memory, engaged: Engagement, scene: Scene, asked: tuple[Query, Answer] | None) -> Steered:
+    """Along the accepted polyline; no path: brake and hold, then ask again."""
+    decision = None
+    if asked is not None:
+        memory, engaged, decision = settle(memory, engaged, *asked, scene.percept, scene.params)
+    path, params = engaged.path, scene.params
+    if path is None or _must_stop(scene):
+        held = _held(memory, replace(engaged, path=None), scene)
+        return replace(held, decision=decision)
+    margin_m = min(params.vehicle.corridor_m, path.margin_m)
+    route = Route(path.vertices_ne_m, path.s_m, scene.task.cruise_m_s, engaged.down_m, margin_m)
+    course = course_along(path.vertices_ne_m, path.s_m)
+    yaw = turned(memory.yaw_sp_rad, course, scene.dt_s, params.vehicle.yaw_rate_rad_s)
+    tracked = track(route, scene.state, scene.percept, yaw, params)
+    engaged = replace(engaged, path=replace(path, s_m=tracked.s_m), stop=None)
+    return Steered(memory, engaged, tracked.setpoint, tracked, decision)
+
+
+def _land(memory: Memory, engaged: Engagement, scene: Scene) -> Steered:
+    """Onto the goal; the descent pauses at once where it is not safe."""
+    assert engaged.landing is not None  # set on entry, cleared on exit
+    safe = landing_safe(scene.facts, scene.limits)
+    began, command = landing.step(engaged.landing, scene.state, safe, scene.params.landing)
+    if _must_stop(scene):
+        return _held(memory, replace(engaged, landing=began), scene)
+    yaw = turned(memory.yaw_sp_rad, command.yaw_rad, scene.dt_s, scene.params.vehicle.yaw_rate_rad_s)
+    setpoint = Setpoint(scene.state.t_s, command.pos_ned_m, command.vel_ned_m_s, command.acc_ned_m_s2, yaw)
+    engaged = replace(engaged, landing=began, stop=None)
+    return Steered(memory, engaged, setpoint, touchdown=command.touchdown)
+
+
+def _must_stop(scene: Scene) -> bool:
+    """Would going on as now touch something remembered before the vehicle stands?"""
+    return limits.velocity_stop_needed(
+        scene.state.pos_ned_m,
+        scene.state.vel_ned_m_s,
+        scene.percept.static_ne_m,
+        scene.params.vehicle.radius_m,
+        scene.params.limits,
+    )
