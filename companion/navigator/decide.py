@@ -65,6 +65,7 @@ def question(engaged: Engagement, state: VehicleState, percept: Percept, task: T
         params.vehicle.radius_m,
         _prefix(engaged, state, params),
         observation(state, obstacles_ne_m, engaged.start_ne_m, task.goal_ned_m),
+        engaged.start_ne_m,
     )
 
 

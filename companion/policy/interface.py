@@ -20,13 +20,18 @@ class Query:
     radius_m: float  # of the vehicle
     prefix_ne_m: F64  # (k, 2) already committed: ends where the new path has to begin, k = 1 is the vehicle's place
     observation: F64  # (72,)
+    start_ne_m: F64  # (2,) where OFFBOARD began: the line to the goal starts there
 
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """Five waypoints in local NED, (5, 2); fewer only where the goal is nearer."""
+    """Waypoints in local NED, (k, 2): the committed stretch if there is one, then five new ones (fewer near the goal).
+
+    ``others_ne_m`` are next choices, best first: where the checker does not keep the first, it is asked about these.
+    """
 
     waypoints_ne_m: F64
+    others_ne_m: tuple[F64, ...] = ()
 
 
 class Policy(Protocol):

@@ -45,7 +45,8 @@ def known(hits: F64, seen: bool = True) -> GridMap:
 
 def query(grid: GridMap, pos: F64, prefix: F64 | None = None, goal: F64 = GOAL, hazard: F64 = NOTHING) -> Query:
     state = VehicleState(NOW_S, np.array([*pos, -2.5]), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))
-    return Query(state, goal, grid, hazard, RADIUS_M, pos[None] if prefix is None else prefix, np.zeros(72))
+    prefix = pos[None] if prefix is None else prefix
+    return Query(state, goal, grid, hazard, RADIUS_M, prefix, np.zeros(72), np.zeros(2))
 
 
 def way(hits: F64, pos: F64, **given: F64) -> F64 | None:
