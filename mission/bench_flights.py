@@ -22,9 +22,9 @@ class Flown(NamedTuple):
     """One flight over UDP in lockstep; what the names mean stands in ``bench_speed.FIGURES``."""
 
     udp_lockstep_rtf: float
-    tick_p50_ms: float
-    tick_p99_ms: float
-    decision_p99_ms: float
+    flight_tick_p50_ms: float
+    flight_tick_p99_ms: float
+    flight_decision_p99_ms: float
     companion_rss_mb: float
     first_setpoint_s: float
     flight_wall_s: float

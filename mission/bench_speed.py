@@ -12,8 +12,12 @@ import time
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from companion import navigator
+from companion.core.inputs import Inputs
 from companion.core.types import F64, Setpoint
+from companion.navigator.record import STANDBY
 from mission.bench_flights import Flown, fly_once
 from mission.flight_plan import FlightPlan, plan_flight
 from mission.simulate import fly_in_process
@@ -28,9 +32,12 @@ FIGURES: Final = {
     "in_process_ratio": "the latter over the former",
     "closed_loop_rtf": "trajectory 2 with the navigator, in one process, a second of CPU time",
     "udp_lockstep_rtf": "trajectory 2 over UDP: vehicle, companion and operator, OFFBOARD to the end",
-    "tick_p50_ms": "of that flight's ticks in OFFBOARD without a decision",
+    "tick_p50_ms": "trajectory 2's inputs ticked alone, in OFFBOARD, no decision; of each tick's turns the median",
     "tick_p99_ms": "of the same ticks",
-    "decision_p99_ms": "of its ticks with a decision",
+    "decision_p99_ms": "of those with a decision",
+    "flight_tick_p50_ms": "as it was in the flight over UDP, three processes on this machine's cores, by the wall",
+    "flight_tick_p99_ms": "of the same ticks",
+    "flight_decision_p99_ms": "of those with a decision",
     "companion_rss_mb": "most memory that the companion held in it",
     "first_setpoint_s": "from the command line to the first setpoint",
     "flight_wall_s": "from the command line to its end, pictures drawn",
@@ -46,6 +53,8 @@ SPEED_M_S = 3.0
 WIND = Wind((2.0, 1.0, 0.0), Turbulence.LIGHT)
 SCAN_S = 0.04  # 25 Hz
 FLIGHTS = 3
+TURNS = 5  # of the same inputs
+STANDING_BY, PLAIN, DECIDED = range(3)
 
 
 def measure(seed: int) -> dict[str, Any]:
@@ -56,7 +65,7 @@ def measure(seed: int) -> dict[str, Any]:
         "bare_rtf": STRETCH_S / float(np.median(rounds[:, 0])),
         "in_process_rtf": STRETCH_S / float(np.median(rounds[:, 1])),
         "in_process_ratio": float(np.median(rounds[:, 0] / rounds[:, 1])),
-        "closed_loop_rtf": _closed_loop_rtf(plan_flight("trajectory2", seed)),
+        **_closed_loop(plan_flight("trajectory2", seed)),
         **_medians([fly_once("trajectory2", seed) for _ in range(FLIGHTS)]),
         "load": load,
         "python": platform.python_version(),
@@ -126,7 +135,30 @@ def _full_s(sim: Simulation, back: bool) -> float:
     return time.process_time() - began_s
 
 
-def _closed_loop_rtf(plan: FlightPlan) -> float:
+def _closed_loop(plan: FlightPlan) -> dict[str, float]:
+    """A flight in this process, and the navigator alone on the inputs of that flight."""
+    inputs: list[Inputs] = []
     began_s = time.process_time()
-    flight = fly_in_process(plan)
-    return flight.sim.t_s / (time.process_time() - began_s)
+    flight = fly_in_process(plan, lambda record: inputs.append(record.inputs))
+    rtf = flight.sim.t_s / (time.process_time() - began_s)
+    turns = [_ticks_ms(plan, inputs) for _ in range(TURNS)]
+    cost_ms = np.median([ms for ms, _ in turns], axis=0)
+    kind = turns[0][1]
+    return {
+        "closed_loop_rtf": rtf,
+        "tick_p50_ms": float(np.median(cost_ms[kind == PLAIN])),
+        "tick_p99_ms": float(np.percentile(cost_ms[kind == PLAIN], 99)),
+        "decision_p99_ms": float(np.percentile(cost_ms[kind == DECIDED], 99)),
+    }
+
+
+def _ticks_ms(plan: FlightPlan, inputs: list[Inputs]) -> tuple[F64, NDArray[np.int8]]:
+    """Wall time of each tick, and of which kind it was: standing by, plain, with a decision."""
+    memory = navigator.start(plan.params)
+    took_s, kind = np.empty(len(inputs)), np.empty(len(inputs), np.int8)
+    for i, seen in enumerate(inputs):
+        began_s = time.perf_counter()
+        memory, _, record = navigator.tick(memory, seen, plan.task, plan.params)
+        took_s[i] = time.perf_counter() - began_s
+        kind[i] = STANDING_BY if record.mode == STANDBY else DECIDED if record.decision is not None else PLAIN
+    return took_s * 1e3, kind

@@ -19,7 +19,7 @@ from companion.core.types import F64
 F32 = NDArray[np.float32]
 Index = NDArray[np.intp]
 
-AZIMUTH_BINS = 720  # 0.5 deg: 12 cm at 14 m, finer than a cell
+AZIMUTH_BINS = 360  # 1 deg: 21 cm at 12 m, a cell
 SUBCELLS = 4  # range and azimuth tables exist for 4 x 4 positions of the vehicle inside its cell
 NEVER = np.float32(0.0)  # stamps are vehicle time, which is positive
 # Inner edges of the rings of cells that share one angular erosion.
@@ -35,8 +35,8 @@ class MapParams:
     """Size and memory of the rolling map."""
 
     cell_m: float = param(0.2, "SN_MAP_CELL", "Edge of a cell", "m", 0.05, 0.5)
-    cells: int = param(144, "SN_MAP_CELLS", "Cells along one side of the map", "", 40, 400)
-    sense_m: float = param(14.0, "SN_MAP_SENSE", "Ranges beyond this are not entered", "m", 3.0, 40.0)
+    cells: int = param(128, "SN_MAP_CELLS", "Cells along one side of the map", "", 40, 400)
+    sense_m: float = param(12.0, "SN_MAP_SENSE", "Ranges beyond this are not entered", "m", 3.0, 40.0)
     certified_s: float = param(
         5.0, "SN_MAP_CERT_T", "A hit may not occupy a cell certified free this lately", "s", 0, 60
     )
@@ -99,7 +99,7 @@ def occupied(grid: GridMap, t_s: float, params: MapParams) -> NDArray[np.bool_]:
 
 def occupied_points(grid: GridMap, t_s: float, params: MapParams) -> F64:
     """(k, 2) remembered hits, north and east."""
-    cells = np.flatnonzero(occupied(grid, t_s, params))
+    cells = occupied(grid, t_s, params).ravel().nonzero()[0]
     return grid.hit_ne_m.reshape(-1, 2).take(cells, axis=0).astype(np.float64)
 
 
@@ -199,7 +199,7 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     Returns the middles of the latter arcs, (m, 2), but for those with a cell behind them that was not certified: the
     rim of something that stands and is passed shows itself a few centimetres inside cells that count as free.
     """
-    near = np.flatnonzero(scan.hit_m < params.sense_m)
+    near = (scan.hit_m < params.sense_m).nonzero()[0]
     if len(near) == 0:
         return np.empty((0, 2))
     sector, direction = scan.hit_sector.take(near), AZIMUTH_DIR.take(scan.hit_bin.take(near), axis=0)

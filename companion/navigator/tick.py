@@ -72,9 +72,15 @@ def sense(memory: Memory, inputs: Inputs, task: Task, params: Params) -> Pending
         params.movers,
     )
     dt_s = state.t_s - memory.t_s
-    memory = replace(memory, grid=percept.grid, tracks=percept.tracks, ticks=memory.ticks + 1, t_s=state.t_s)
-    if known:
-        memory = replace(memory, state=state, ground_down_m=_ground(memory, inputs))
+    memory = replace(
+        memory,
+        grid=percept.grid,
+        tracks=percept.tracks,
+        ticks=memory.ticks + 1,
+        t_s=state.t_s,
+        state=state if known else memory.state,
+        ground_down_m=_ground(memory, inputs) if known else memory.ground_down_m,
+    )
     goal_m = _goal_distance(state, task)
     if not (inputs.status.offboard and inputs.status.armed) or memory.state is None:
         return Pending(None, memory, inputs, percept, goal_m, None, None)

@@ -6,7 +6,8 @@ range times |P (cos b, sin b)|. Beams that would meet the ground before their re
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,7 @@ def flatten(scan: Scan, state: VehicleState, lidar_up_m: float, ground_margin_m:
         lidar_up_m: height of the LiDAR above that position, plus the down of the ground in local NED.
         ground_margin_m: returns lower than this above the ground are the ground.
     """
+    scan = _all_round(scan)
     rotation = rotation_ned_frd(state.q_ned_frd)
     ground_m = _ground_slant_m(
         scan, rotation, _trusted_height_m(lidar_up_m - float(state.pos_ned_m[2]), ground_margin_m)
@@ -50,7 +52,7 @@ def flatten(scan: Scan, state: VehicleState, lidar_up_m: float, ground_margin_m:
     stretch = 1.0 / np.hypot(forward, right)  # |P (cos b, sin b)|: horizontal metres per slant metre
     sector = _sector_of(np.arctan2(right, forward), scan)
     bin_hit = hit.take(sector)
-    bins = np.flatnonzero(bin_hit)
+    bins = bin_hit.nonzero()[0]
     horizontal_m = scan.range_m.take(sector) * stretch
     polar = PolarScan(
         t_s=scan.t_s,
@@ -64,6 +66,12 @@ def flatten(scan: Scan, state: VehicleState, lidar_up_m: float, ground_margin_m:
     return Flattened(polar, _at_bearings(np.where(bin_hit, horizontal_m, nothing_m), rotation))
 
 
+def _all_round(scan: Scan) -> Scan:
+    """The scan with unknown sectors where the sensor does not look."""
+    missing = math.ceil(math.tau / scan.increment_rad - 1e-3) - len(scan.range_m)
+    return scan if missing <= 0 else replace(scan, range_m=np.append(scan.range_m, np.full(missing, np.nan)))
+
+
 def _in_body_plane(rotation: F64) -> tuple[F64, F64]:
     """The azimuth directions seen in the body plane, not normalised: P inverted and applied."""
     (a, b), (c, d) = rotation[:2, :2].tolist()
@@ -75,10 +83,12 @@ def _in_body_plane(rotation: F64) -> tuple[F64, F64]:
 
 def _sector_of(bearing_rad: F64, scan: Scan) -> NDArray[np.intp]:
     """Sector that holds each bearing."""
-    n = scan.range_m.shape[0]
     first_edge = scan.angle_offset_rad - scan.increment_rad / 2
     turns = (bearing_rad - first_edge) * (1.0 / math.tau)
-    sector: NDArray[np.intp] = ((turns - np.floor(turns)) * (math.tau / scan.increment_rad)).astype(np.intp) % n
+    turns -= np.floor(turns)
+    turns *= math.tau / scan.increment_rad
+    sector = turns.astype(np.intp)
+    sector[sector >= scan.range_m.shape[0]] = 0  # a full turn, by rounding
     return sector
 
 
@@ -94,12 +104,20 @@ def _ground_slant_m(scan: Scan, rotation: F64, height_m: float) -> F64:
     most = math.hypot(forward, right)
     if most * scan.range_max_m < height_m:
         return np.full(n, np.inf)
-    edge = scan.angle_offset_rad + (np.arange(n + 1) - 0.5) * scan.increment_rad
-    drop = forward * np.cos(edge) + right * np.sin(edge)  # metres down per slant metre
+    cosine, sine = _edges(n, scan.angle_offset_rad, scan.increment_rad)
+    drop = forward * cosine + right * sine  # metres down per slant metre
     steepest = np.maximum(drop[:-1], drop[1:])
-    steepest[_sector_of(np.array(math.atan2(right, forward)), scan)] = most
-    falling = steepest > LEVEL
-    return np.where(falling, height_m / np.where(falling, steepest, 1.0), np.inf)
+    steepest[_sector_of(np.array([math.atan2(right, forward)]), scan)] = most
+    slant_m = height_m / np.maximum(steepest, LEVEL)
+    slant_m[steepest <= LEVEL] = np.inf
+    return slant_m
+
+
+@lru_cache(maxsize=32)
+def _edges(n: int, angle_offset_rad: float, increment_rad: float) -> tuple[F64, F64]:
+    """Cosine and sine (n + 1,) of the bearings between the sectors."""
+    edge = angle_offset_rad + (np.arange(n + 1) - 0.5) * increment_rad
+    return np.cos(edge), np.sin(edge)
 
 
 def _at_bearings(horizontal_m: F64, rotation: F64) -> F64:

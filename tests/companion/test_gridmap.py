@@ -140,3 +140,16 @@ def test_an_unknown_sector_certifies_nothing() -> None:
     assert (flat.polar.free_m == 0.0).all()
     assert np.isnan(flat.bearing_range_m).all()
     assert (gridmap.update(gridmap.empty(PARAMS), flat.polar, PARAMS).free_t == gridmap.NEVER).all()
+
+
+def test_a_sensor_that_looks_ahead_only_says_nothing_of_what_is_behind() -> None:
+    scan, state = ring_scan(1.0, np.zeros(2), np.array([[4.0, 0.0, 0.3]]))
+    ahead = replace(scan, range_m=np.roll(scan.range_m, 14)[:29], angle_offset_rad=-14 * SECTOR_RAD)  # +-72.5 deg
+    flat = flatten(ahead, state, 0.0, 0.4)
+    whole = flatten(replace(scan, angle_offset_rad=0.0), state, 0.0, 0.4)
+    bearing_deg = (np.arange(72) * 5 + 180) % 360 - 180
+    assert np.isnan(flat.bearing_range_m[np.abs(bearing_deg) > 73]).all()
+    assert (flat.bearing_range_m == whole.bearing_range_m)[np.abs(bearing_deg) < 72].all()
+    grid = gridmap.update(gridmap.empty(PARAMS), flat.polar, PARAMS)
+    assert not gridmap.seen(grid, np.array([[-3.0, 0.0]])).any()
+    assert gridmap.seen(grid, np.array([[3.0, 0.0]])).all()
