@@ -1,0 +1,1 @@
+"""Environments, rewards and worlds that policies are trained in; needs the extra ``train``."""
