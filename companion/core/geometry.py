@@ -69,6 +69,8 @@ def project(path_ned_m: F64, pos_ned_m: F64, s_min_m: float = 0.0, s_max_m: floa
     best = Projection(low, math.nan, math.inf)
     for piece in pieces:
         first, last = max(low - piece.s_m, 0.0), min(high - piece.s_m, piece.length_m)
+        if piece is pieces[-1]:
+            first = min(first, last)  # rounding must not put the end beyond the end
         if first > last:
             continue
         dn, de = north - piece.north_m, east - piece.east_m

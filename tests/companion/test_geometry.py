@@ -175,3 +175,12 @@ def test_a_disc_cannot_slip_between_two_points_nearer_than_its_width() -> None:
         pair = np.array([[0.0, -half_gap], [0.0, half_gap]])
         assert geometry.swept_free_length(through, pair, 0.4) < 6.0
     assert geometry.swept_free_length(through, np.array([[0.0, -0.41], [0.0, 0.41]]), 0.4) == 6.0
+
+
+def test_the_end_of_a_polyline_is_found_whatever_rounding_makes_of_its_length() -> None:
+    courses = np.cumsum([0.0, 0.0, 1.0, 1.0, 1.0])
+    steps = np.array([1.0, 1.0, 1.0, 1.0, 0.5])[:, None] * np.stack([np.cos(courses), np.sin(courses)], axis=1)
+    path = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    end_s = geometry.length(path)
+    for past in (0.0, 1e-9, 1.0):
+        assert geometry.project(path, path[-1], end_s + past, end_s + past).distance_m < 1e-9
