@@ -12,6 +12,7 @@ from companion.core.types import LandedState, VehicleState
 from sitl.answers import ACCEPTED, CRITICAL, INFO, CommandResult, Result, StatusText
 from sitl.demand import IDLE, Demand, OffboardSetpoint
 from sitl.failsafe import Facts, Failsafe, without_sticks
+from sitl.geo import Origin
 from sitl.home import Home, here
 from sitl.land_detector import LandDetector
 from sitl.modes import ARMABLE, AUTONOMOUS, FLYABLE, MANUAL, TITLES, FlightMode
@@ -27,7 +28,8 @@ READY_S: Final = 2.5  # PX4 v1.16 SIH: prearm checks pass two to three seconds a
 class Autopilot:
     """Arming, flight modes, take-off, landing, failsafe."""
 
-    def __init__(self, params: ParamStore | None = None) -> None:
+    def __init__(self, params: ParamStore | None = None, origin: Origin | None = None) -> None:
+        """``origin``: where on the globe local ned begins."""
         self.params = params or ParamStore()
         self.armed = False
         self.user_mode = FlightMode.HOLD  # what was asked for; ``mode`` is what is flown
@@ -45,7 +47,7 @@ class Autopilot:
         self.flights = 0
         self._stream = OffboardStream(self.params)
         self._mode_chosen = False  # by a person, since the last update
-        nav = self._navigator = Navigator(self.params, self.steering, self.texts.append)
+        nav = self._navigator = Navigator(self.params, self.steering, self.texts.append, origin or Origin())
         self.plans, self.mission, self.guardian = nav.plans, nav.mission, nav.guardian
 
     # --- what others see --------------------------------------------------------------------------------------

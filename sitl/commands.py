@@ -14,7 +14,6 @@ from sitl.answers import Result
 from sitl.command import ACCEPTED, DENIED, FAILED, REJECTED, UNSUPPORTED, Answer, Command, Handler, answer, whole
 from sitl.link import Link
 from sitl.message_table import BUILDERS
-from sitl.messages import ORIGIN
 from sitl.messages_modes import AVAILABLE_MODES_ID, PROTOCOL_VERSION_ID, available_modes
 from sitl.simulation import Simulation
 
@@ -59,7 +58,7 @@ def _set_mode(command: Command, sim: Simulation, _link: Link) -> Answer:
 def _takeoff(command: Command, sim: Simulation, _link: Link) -> Answer:
     """Take off to p7 above sea level; NaN: MIS_TAKEOFF_ALT above here. Legal before arming."""
     alt_amsl_m = command.params[6]
-    down_m = ORIGIN.down_m(alt_amsl_m) if math.isfinite(alt_amsl_m) else None
+    down_m = sim.origin.down_m(alt_amsl_m) if math.isfinite(alt_amsl_m) else None
     return answer(sim.autopilot.command_takeoff(down_m))
 
 

@@ -14,7 +14,6 @@ from sitl.flight_tasks import stopping_point
 from sitl.guided_tasks import RADIUS_MIN_M, Circle, Goal, Nose, circle_speed_m_s
 from sitl.home import Home, here
 from sitl.link import Link
-from sitl.messages import ORIGIN
 from sitl.modes import FlightMode
 from sitl.simulation import Simulation
 
@@ -46,7 +45,7 @@ def _reposition(command: Command, sim: Simulation, _link: Link) -> Answer:
         return answer(result)
     speed_m_s, yaw_rad = command.params[0], command.params[3]
     pos = before.pos_ned_m.copy() if in_hold and before is not None else stopping_point(ap.state)
-    changed = _level(command, pos)
+    changed = _level(command, sim, pos)
     if math.isfinite(command.params[6]):
         pos[2] = _down_m(command, sim)
     elif changed:
@@ -76,9 +75,9 @@ def _orbit(command: Command, sim: Simulation, _link: Link) -> Answer:
     result = ap.command_mode(FlightMode.ORBIT)
     if result.accepted and ap.state is not None:
         centre = before.centre_ned_m.copy() if before is not None else ap.state.pos_ned_m.copy()
-        _level(command, centre)
+        _level(command, sim, centre)
         if math.isfinite(command.params[6]):
-            centre[2] = ORIGIN.down_m(command.params[6])  # above sea level in every frame, as PX4 and MAVSDK have it
+            centre[2] = sim.origin.down_m(command.params[6])  # above sea level in every frame: PX4, MAVSDK
         speed_m_s = circle_speed_m_s(abs(radius_m), math.copysign(speed_m_s, radius_m))
         ap.steering.orbit(Circle(centre, abs(radius_m), speed_m_s, nose))
     return answer(result)
@@ -107,7 +106,7 @@ def _set_home(command: Command, sim: Simulation, _link: Link) -> Answer:
     if not all(math.isfinite(p) for p in command.params[4:7]):
         return DENIED
     pos = np.zeros(3)
-    _level(command, pos)
+    _level(command, sim, pos)
     pos[2] = _down_m(command, sim)
     yaw_rad = math.radians(command.params[3]) if math.isfinite(command.params[3]) else 0.0
     ap.set_home(Home(pos, yaw_rad, manual=True))
@@ -138,12 +137,12 @@ HANDLERS: Final[Mapping[int, Handler]] = {
 }
 
 
-def _level(command: Command, pos_ned_m: F64) -> bool:
+def _level(command: Command, sim: Simulation, pos_ned_m: F64) -> bool:
     """Put a command's latitude and longitude into ``pos_ned_m``, when it has any."""
     lat_deg, lon_deg = command.params[4], command.params[5]
     if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
         return False
-    pos_ned_m[:2] = ORIGIN.north_east_m(lat_deg, lon_deg)
+    pos_ned_m[:2] = sim.origin.north_east_m(lat_deg, lon_deg)
     return True
 
 
@@ -152,4 +151,4 @@ def _down_m(command: Command, sim: Simulation) -> float:
     home = sim.autopilot.home
     if command.frame in ABOVE_HOME:
         return (home.down_m if home is not None else 0.0) - command.params[6]
-    return ORIGIN.down_m(command.params[6])
+    return sim.origin.down_m(command.params[6])

@@ -11,7 +11,6 @@ from sitl import setpoints
 from sitl.answers import CRITICAL, StatusText
 from sitl.guided_tasks import Target
 from sitl.link import COMPONENT, Link
-from sitl.messages import ORIGIN
 from sitl.pilot import sticks_of
 from sitl.simulation import Simulation
 
@@ -37,7 +36,7 @@ class Inputs:
             return
         ap = self._sim.autopilot
         try:
-            setpoint = setpoints.global_int(message, ORIGIN, ap.home.down_m if ap.home is not None else 0.0)
+            setpoint = setpoints.global_int(message, self._sim.origin, ap.home.down_m if ap.home is not None else 0.0)
         except setpoints.SetpointError as error:
             ap.texts.append(StatusText(CRITICAL, str(error)))
             return
@@ -63,7 +62,8 @@ class Inputs:
         vel = np.array(message.vel, dtype=np.float64)
         if not np.isfinite(vel).all():
             vel = np.zeros(3)
-        pos = np.array([*ORIGIN.north_east_m(lat_deg, lon_deg), ORIGIN.down_m(message.alt)])
+        origin = self._sim.origin
+        pos = np.array([*origin.north_east_m(lat_deg, lon_deg), origin.down_m(message.alt)])
         self._sim.autopilot.steering.target = Target(self._sim.t_s, pos, vel)
 
     def _for_us(self, message: Message) -> bool:

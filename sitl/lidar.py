@@ -56,11 +56,11 @@ class Lidar:
         self._cos_sin = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=1)
         self.scan(0.0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))  # compile now, not in the first flight tick
 
-    def scan(self, t_s: float, pos_world_ned_m: F64, q_ned_frd: F64) -> Scan:
-        """The sweep measured at ``t_s`` from a world position (3,) and attitude."""
+    def scan(self, t_s: float, pos_world_ned_m: F64, q_ned_frd: F64, circles: F64 | None = None) -> Scan:
+        """The sweep at ``t_s`` from a world position (3,) and attitude; ``circles`` None: the world's at ``t_s``."""
         p = self.params
         index = round(t_s * p.rate_hz)
-        ray_m = self.true_ranges(t_s, pos_world_ned_m, q_ned_frd)
+        ray_m = self.true_ranges(t_s, pos_world_ned_m, q_ned_frd, circles)
         measure(ray_m, self._scan_key(index), p.sigma_m, p.dropout, p.range_min_m, p.range_max_m)
         width = p.rays // p.sectors
         step = round(DITHER[index % len(DITHER)] * width) if p.dither else 0
@@ -70,10 +70,10 @@ class Lidar:
         centre_rad = (first_ray + (width - 1) / 2) * (math.tau / p.rays)
         return Scan(t_s, sector_m, centre_rad, math.tau / p.sectors, p.range_min_m, p.range_max_m)
 
-    def true_ranges(self, t_s: float, pos_world_ned_m: F64, q_ned_frd: F64) -> F64:
+    def true_ranges(self, t_s: float, pos_world_ned_m: F64, q_ned_frd: F64, circles: F64 | None = None) -> F64:
         """What every ray (rays,) would read without noise: ray i at bearing i * 2 pi / rays; inf beyond the range."""
         ray_m = np.empty(self.params.rays)
-        circles = self._world.at(t_s)
+        circles = self._world.at(t_s) if circles is None else circles
         lens_ned_m = pos_world_ned_m - np.array([0.0, 0.0, self.params.mount_up_m])
         cast_rays(lens_ned_m, q_ned_frd, circles, self._boxes, self._cos_sin, self.params.range_max_m, ray_m)
         return ray_m

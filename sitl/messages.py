@@ -8,13 +8,11 @@ from pymavlink.dialects.v20 import common as mav
 
 from companion.core import codec
 from companion.core.frames import euler_rad
-from sitl.geo import Origin
 from sitl.modes import base_mode
 from sitl.simulation import Simulation
 
 Message = Any  # a MAVLink_*_message object
 
-ORIGIN: Final = Origin()
 
 # SYS_STATUS of a ready PX4 v1.16 (measured), with the geofence reported healthy: MAVProxy calls it breached otherwise.
 PRESENT: Final = 0x0300402F
@@ -83,12 +81,12 @@ def global_position_int(sim: Simulation) -> Message:
     """GLOBAL_POSITION_INT."""
     state = sim.state
     north_m, east_m, down_m = state.pos_ned_m.tolist()
-    lat_deg, lon_deg = ORIGIN.lat_lon_deg(north_m, east_m)
+    lat_deg, lon_deg = sim.origin.lat_lon_deg(north_m, east_m)
     return mav.MAVLink_global_position_int_message(
         codec.to_ms(state.t_s),
         _e7(lat_deg),
         _e7(lon_deg),
-        round(ORIGIN.alt_m(down_m) * 1e3),
+        round(sim.origin.alt_m(down_m) * 1e3),
         round((_home_down_m(sim) - down_m) * 1e3),
         *(_clip16(v * 1e2) for v in state.vel_ned_m_s.tolist()),
         _heading_cdeg(sim),
@@ -99,7 +97,7 @@ def gps_raw_int(sim: Simulation) -> Message:
     """GPS_RAW_INT of a receiver without error."""
     state = sim.state
     north_m, east_m, down_m = state.pos_ned_m.tolist()
-    lat_deg, lon_deg = ORIGIN.lat_lon_deg(north_m, east_m)
+    lat_deg, lon_deg = sim.origin.lat_lon_deg(north_m, east_m)
     north_m_s, east_m_s, _ = state.vel_ned_m_s.tolist()
     course_rad = math.atan2(east_m_s, north_m_s) % math.tau
     return mav.MAVLink_gps_raw_int_message(
@@ -107,7 +105,7 @@ def gps_raw_int(sim: Simulation) -> Message:
         fix_type=mav.GPS_FIX_TYPE_3D_FIX if sim.trouble.errors.gps_ok else mav.GPS_FIX_TYPE_NO_FIX,
         lat=_e7(lat_deg),
         lon=_e7(lon_deg),
-        alt=round(ORIGIN.alt_m(down_m) * 1e3),
+        alt=round(sim.origin.alt_m(down_m) * 1e3),
         eph=70,  # HDOP and VDOP of a good receiver, times 100
         epv=110,
         vel=round(math.hypot(north_m_s, east_m_s) * 1e2),
@@ -159,11 +157,11 @@ def home_position(sim: Simulation) -> Message | None:
         return None
     q = [math.cos(home.yaw_rad / 2), 0.0, 0.0, math.sin(home.yaw_rad / 2)]
     north_m, east_m, down_m = home.pos_ned_m.tolist()
-    lat_deg, lon_deg = ORIGIN.lat_lon_deg(north_m, east_m)
+    lat_deg, lon_deg = sim.origin.lat_lon_deg(north_m, east_m)
     return mav.MAVLink_home_position_message(
         _e7(lat_deg),
         _e7(lon_deg),
-        round(ORIGIN.alt_m(down_m) * 1e3),
+        round(sim.origin.alt_m(down_m) * 1e3),
         north_m,
         east_m,
         down_m,
@@ -178,7 +176,7 @@ def home_position(sim: Simulation) -> Message | None:
 def altitude(sim: Simulation) -> Message:
     """ALTITUDE."""
     down_m = float(sim.state.pos_ned_m[2])
-    amsl_m = ORIGIN.alt_m(down_m)
+    amsl_m = sim.origin.alt_m(down_m)
     return mav.MAVLink_altitude_message(
         codec.to_us(sim.state.t_s), amsl_m, amsl_m, -down_m, _home_down_m(sim) - down_m, math.nan, math.nan
     )
@@ -190,7 +188,7 @@ def vfr_hud(sim: Simulation) -> Message:
     north_m_s, east_m_s, down_m_s = state.vel_ned_m_s.tolist()
     ground_m_s = math.hypot(north_m_s, east_m_s)
     throttle = round(100 * min(1.0, max(0.0, sim.truth.thrust_norm)))
-    alt_m = ORIGIN.alt_m(float(state.pos_ned_m[2]))
+    alt_m = sim.origin.alt_m(float(state.pos_ned_m[2]))
     return mav.MAVLink_vfr_hud_message(ground_m_s, ground_m_s, _heading_cdeg(sim) // 100, throttle, alt_m, -down_m_s)
 
 
@@ -202,7 +200,7 @@ def estimator_status(sim: Simulation) -> Message:
 
 def gps_global_origin(sim: Simulation) -> Message:
     """GPS_GLOBAL_ORIGIN."""
-    lat, lon, alt = _e7(ORIGIN.lat_deg), _e7(ORIGIN.lon_deg), round(ORIGIN.alt_amsl_m * 1e3)
+    lat, lon, alt = _e7(sim.origin.lat_deg), _e7(sim.origin.lon_deg), round(sim.origin.alt_amsl_m * 1e3)
     return mav.MAVLink_gps_global_origin_message(lat, lon, alt, codec.to_us(sim.t_s))
 
 

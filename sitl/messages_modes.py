@@ -13,7 +13,6 @@ from companion.core.frames import quaternion, yaw_rad
 from companion.core.types import F64
 from sitl.demand import Demand, Loop
 from sitl.extra_messages import RawMessage, protocol_version
-from sitl.messages import ORIGIN
 from sitl.modes import TITLES, FlightMode
 from sitl.simulation import Simulation
 from sitl.streams import CURRENT_MODE_ID
@@ -77,14 +76,14 @@ def orbit_execution_status(sim: Simulation) -> Message | None:
     if circle is None or sim.autopilot.mode is not FlightMode.ORBIT:
         return None
     north_m, east_m, down_m = circle.centre_ned_m.tolist()
-    lat_deg, lon_deg = ORIGIN.lat_lon_deg(north_m, east_m)
+    lat_deg, lon_deg = sim.origin.lat_lon_deg(north_m, east_m)
     return mav.MAVLink_orbit_execution_status_message(
         codec.to_us(sim.t_s),
         math.copysign(circle.radius_m, circle.speed_m_s),
         mav.MAV_FRAME_GLOBAL,
         round(lat_deg * 1e7),
         round(lon_deg * 1e7),
-        ORIGIN.alt_m(down_m),
+        sim.origin.alt_m(down_m),
     )
 
 

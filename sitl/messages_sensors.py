@@ -15,7 +15,6 @@ from companion.core.frames import rotation_ned_frd
 from companion.core.types import F64
 from sitl.aircraft import GRAVITY_M_S2
 from sitl.hil_sensors import LAPSE_K_M, SEA_LEVEL_K, ZERO_C_K, field_ned_gauss, pressure_at
-from sitl.messages import ORIGIN
 from sitl.simulation import Simulation
 
 Message = Any  # a MAVLink_*_message object
@@ -107,7 +106,7 @@ def hil_state_quaternion(sim: Simulation) -> Message:
     """HIL_STATE_QUATERNION: the truth."""
     truth = sim.truth
     north_m, east_m, down_m = truth.pos_ned_m.tolist()
-    lat_deg, lon_deg = ORIGIN.lat_lon_deg(north_m, east_m)
+    lat_deg, lon_deg = sim.origin.lat_lon_deg(north_m, east_m)
     speed_cm_s = round(float(np.linalg.norm(truth.vel_ned_m_s)) * 1e2)
     return mav.MAVLink_hil_state_quaternion_message(
         codec.to_us(truth.t_s),
@@ -115,7 +114,7 @@ def hil_state_quaternion(sim: Simulation) -> Message:
         *truth.rates_frd_rad_s.tolist(),
         round(lat_deg * 1e7),
         round(lon_deg * 1e7),
-        round(ORIGIN.alt_m(down_m) * 1e3),
+        round(sim.origin.alt_m(down_m) * 1e3),
         *(_int16(v * 1e2) for v in truth.vel_ned_m_s.tolist()),
         min(speed_cm_s, 0xFFFF),
         min(speed_cm_s, 0xFFFF),
@@ -127,7 +126,7 @@ def wind_cov(sim: Simulation) -> Message:
     """WIND_COV: the mean wind."""
     wind = sim.config.wind
     north, east, down = wind.mean_ned_m_s if wind is not None else (0.0, 0.0, 0.0)
-    alt_m = ORIGIN.alt_m(float(sim.state.pos_ned_m[2]))
+    alt_m = sim.origin.alt_m(float(sim.state.pos_ned_m[2]))
     return mav.MAVLink_wind_cov_message(
         codec.to_us(sim.t_s), north, east, down, NO_VARIANCE, NO_VARIANCE, alt_m, NO_VARIANCE, NO_VARIANCE
     )
@@ -171,7 +170,7 @@ def _field_frd_gauss(sim: Simulation) -> F64:
 
 
 def _baro_alt_m(sim: Simulation) -> float:
-    return ORIGIN.alt_m(float(sim.truth.pos_ned_m[2] + sim.trouble.errors.pos_ned_m[2]))
+    return sim.origin.alt_m(float(sim.truth.pos_ned_m[2] + sim.trouble.errors.pos_ned_m[2]))
 
 
 def _imu_units(sim: Simulation) -> list[int]:

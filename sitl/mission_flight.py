@@ -47,14 +47,19 @@ class MissionFlight:
     """Flies the mission of the store."""
 
     def __init__(
-        self, store: MissionStore, params: ParamStore, home: Callable[[], Home], say: Callable[[StatusText], None]
+        self,
+        store: MissionStore,
+        params: ParamStore,
+        home: Callable[[], Home],
+        say: Callable[[StatusText], None],
+        origin: Origin,
     ) -> None:
         self.reached: int | None = None  # the item reached last since the mission was started or loaded
         self.ending: Ending | None = None  # set when there is nothing more to do
         self._store = store
         self._params = params
         self._say = say
-        self._origin = Origin()
+        self._origin = origin
         self._home = home
         self._route = Route((), self._origin, home, params)
         self.active = False

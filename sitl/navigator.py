@@ -21,11 +21,14 @@ from sitl.steering import BEHAVIOURS, Steering
 class Navigator:
     """Serves one autopilot; steers through its ``steering``."""
 
-    def __init__(self, params: ParamStore, steering: Steering, say: Callable[[StatusText], None]) -> None:
+    def __init__(
+        self, params: ParamStore, steering: Steering, say: Callable[[StatusText], None], origin: Origin
+    ) -> None:
         self.plans = MissionStore(self._plan_changed)
-        self.mission = MissionFlight(self.plans, params, lambda: steering.home, say)
+        self.mission = MissionFlight(self.plans, params, lambda: steering.home, say, origin)
         self.guardian = Guardian(self.plans, params, lambda: steering.home, say)
         self._steering = steering
+        self._origin = origin
         self._say = say
         self._state: VehicleState | None = None
         self._landed = True
@@ -66,7 +69,7 @@ class Navigator:
                 self._say(StatusText(CRITICAL, why))
             return
         in_air = self._state.pos_ned_m if self._state is not None and not self._landed else None
-        self.guardian.load(kind, in_air, Origin())
+        self.guardian.load(kind, in_air, self._origin)
         self._steering.safe_points_ned_m = self.guardian.safe_points_ned_m
 
     def _objection(self) -> str | None:

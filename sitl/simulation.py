@@ -21,9 +21,11 @@ from sitl.autopilot import Autopilot
 from sitl.contact import ContactWatch
 from sitl.demand import Demand, Loop, OffboardSetpoint
 from sitl.faults import FaultBook
+from sitl.geo import Origin
 from sitl.lidar import Lidar, LidarParams
 from sitl.mission_items import MissionType
 from sitl.modes import FlightMode
+from sitl.neighbours import Neighbours
 from sitl.px4_params import ParamStore
 from sitl.setpoints import of_companion
 from sitl.trouble import Trouble
@@ -48,6 +50,7 @@ class SimConfig:
     lidar: LidarParams = field(default_factory=LidarParams)
     px4_params: Mapping[str, float] = field(default_factory=dict)
     faults: tuple[str, ...] = ()  # as ``sitl.faults`` reads them
+    origin: Origin = field(default_factory=Origin)  # where on the globe the vehicle stands at the start
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +65,11 @@ class Observation:
 class Simulation:
     """One vehicle in one world."""
 
-    def __init__(self, world: World, config: SimConfig | None = None) -> None:
+    def __init__(self, world: World, config: SimConfig | None = None, neighbours: Neighbours | None = None) -> None:
+        """``neighbours``: the other vehicles of the world, for whoever tells where they are; None: there are none."""
         self.config = config or SimConfig()
+        self.origin = self.config.origin
+        self.neighbours = neighbours
         self.world = world
         self.rows: list[TruthRow] = []  # one a scan, until the vehicle has disarmed after its flight
         spawn = world.start_ned_m if self.config.spawn_ned_m is None else self.config.spawn_ned_m
@@ -75,9 +81,10 @@ class Simulation:
         self.boot_unix_us = 0  # when the vehicle booted, UNIX time; told from outside
         self._delay_steps = math.ceil((self.config.latency_s + self.config.lidar.latency_s) * 1e3 / STEP_MS - 1e-9)
         self._step = 0
+        self._booted_ms = 0  # world time of the last boot
         self._queue: deque[tuple[int, OffboardSetpoint]] = deque()  # step from which it is in force
         self._vehicle = Vehicle(STEP_MS / 1e3)
-        self.autopilot = Autopilot(ParamStore(loops=self._vehicle.parameters))
+        self.autopilot = Autopilot(ParamStore(loops=self._vehicle.parameters), self.origin)
         for name, value in self.config.px4_params.items():
             self.set_parameter(name, value)
         self._vehicle.reset(self.config.seed, self.config.spawn_yaw_rad, self.config.wind)
@@ -87,7 +94,7 @@ class Simulation:
         self._armed = False
         self._touched = False  # before the last boot
         self._lidar = Lidar(world, self.config.lidar, self.config.seed)
-        self._contact = ContactWatch(world, self.config.radius_m, self.spawn_ned_m, STEP_MS / 1e3, self.scan_steps)
+        self._contact = self._contact_watch()
         self._closed = False  # no more rows
         self._sense()
         self._look()
@@ -106,6 +113,11 @@ class Simulation:
     def t_s(self) -> float:
         """Vehicle time since boot."""
         return from_ms(self._step * STEP_MS)
+
+    @property
+    def world_s(self) -> float:
+        """Time of the world: where movers and neighbours are. Without neighbours the world boots with the vehicle."""
+        return from_ms(self._booted_ms + self._step * STEP_MS)
 
     @property
     def t_ms(self) -> int:
@@ -164,6 +176,8 @@ class Simulation:
         """Start anew where the vehicle stands: vehicle time 0, disarmed; parameters and plans stay."""
         stands, plans = self.truth, self.autopilot.plans
         self.boot_unix_us += self._step * STEP_MS * 1000
+        if self.neighbours is not None:  # scans stay in step with theirs
+            self._booted_ms += self._step // self.scan_steps * self.scan_steps * STEP_MS
         self._step, self._applied, self._armed, self._closed, self.scan = 0, None, False, False, None
         self._queue.clear()
         self._vehicle.place(
@@ -173,11 +187,11 @@ class Simulation:
             self.config.wind,
         )
         self.trouble = Trouble(self.trouble.book, self.config.seed, self._vehicle, self.config.wind)
-        self.autopilot = Autopilot(self.autopilot.params)
+        self.autopilot = Autopilot(self.autopilot.params, self.origin)
         for kind in MissionType:
             self.autopilot.plans.replace(kind, plans.items(kind))
         self._touched = self.contact
-        self._contact = ContactWatch(self.world, self.config.radius_m, self.spawn_ned_m, STEP_MS / 1e3, self.scan_steps)
+        self._contact = self._contact_watch()
         self._sense()
         self._look()
 
@@ -217,13 +231,13 @@ class Simulation:
         self.state = quantise_state(self.trouble.estimate(self.t_s, truth))
 
     def _look(self) -> None:
-        self._contact.look(self._step, self.t_s, self.truth)
+        self._contact.look(self._step, self.world_s, self.truth)
 
     def _observe(self) -> Observation:
         ap = self.autopilot
         mode, landed = ap.mode, ap.landed_state
         self._check_scan_instant()
-        scan = self._lidar.scan(self.t_s, self.truth.pos_ned_m + self.spawn_ned_m, self.truth.q_ned_frd)
+        scan = self._sweep()
         self.scan = quantise_scan(scan)
         clearance_m = self._contact.take_smallest_m()
         if not self._closed:
@@ -231,6 +245,17 @@ class Simulation:
             self.rows.append(TruthRow(self.t_ms, self.truth, clearance_m, self.contact, mode, ap.armed, landed))
         status = AutopilotStatus(ap.armed, mode is FlightMode.OFFBOARD, landed)
         return Observation(self.state, status, self.scan)
+
+    def _sweep(self) -> Scan:
+        pos_world_ned_m, circles = self.truth.pos_ned_m + self.spawn_ned_m, None
+        if self.neighbours is not None:
+            seen = self.neighbours.circles(self.world_s, float(pos_world_ned_m[2]))
+            circles = np.concatenate([self.world.at(self.world_s), seen])
+        return self._lidar.scan(self.t_s, pos_world_ned_m, self.truth.q_ned_frd, circles)
+
+    def _contact_watch(self) -> ContactWatch:
+        c, step_s = self.config, STEP_MS / 1e3
+        return ContactWatch(self.world, c.radius_m, self.spawn_ned_m, step_s, self.scan_steps, self.neighbours)
 
     def _check_scan_instant(self) -> None:
         """A scan instant off the control grid has neither state nor clearance yet."""

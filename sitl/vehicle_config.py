@@ -8,6 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+from sitl.geo import Origin
 from sitl.lidar import LidarParams
 from sitl.server import RunConfig
 from sitl.simulation import SimConfig
@@ -102,6 +103,8 @@ def _sim(data: dict[str, Any]) -> SimConfig:
         values["wind"] = Wind((n, e, d), Turbulence[values["wind"].get("turbulence", "NONE")])
     if "faults" in values:
         values["faults"] = tuple(values["faults"])
+    if "origin" in values:
+        values["origin"] = Origin(**values["origin"])
     if "lidar" in values:
         values["lidar"] = LidarParams(**values["lidar"])
     return SimConfig(**values)
