@@ -41,6 +41,7 @@ class CheckQuery:
     points_ned_m: F64  # (n, 2) everything remembered
     proposal_ned_m: F64 | None  # (k, 2) waypoints; None: the policy has none
     escape_ned_m: F64 | None  # (k, 2) waypoints of a way out, tried only if the proposal cannot be saved
+    others_ned_m: tuple[F64, ...] = ()  # next choices of the policy, each (k, 2), best first
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,7 @@ class Verdict:
     score: float | None
     keep_score: float | None  # None: fails the collision test at every level
     modify_score: float | None  # None: not needed, or no correction passes
+    choice: int = 0  # which of the policy's choices was kept: 0 is the proposal, 1 the first of the others
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,14 +71,26 @@ REFUSAL = Verdict(VerdictKind.REFUSED, None, None, None, None, None, None)
 
 
 def check(query: CheckQuery, params: CheckerParams) -> Verdict:
-    """Keep or modify by score, the escape if neither passes, else refuse. NaN anywhere in a path fails it."""
+    """What may be flown; NaN anywhere in a path fails it.
+
+    The proposal as it is at the full margin; else the first other choice that passes there; else the better of the
+    proposal as it is and corrected, at a reduced margin; else another choice there; else the escape; else nothing.
+    """
     if not np.isfinite(query.start_ned_m).all():
         return REFUSAL
-    keep, modify = _keep(query, params), None
-    if keep is None or keep.margin_m < params.margins_m()[0]:
-        modify = _modify(query, keep.margin_m if keep else -math.inf, params)
-    passing = [candidate for candidate in (keep, modify) if candidate is not None]
-    best = max(passing, key=lambda candidate: candidate.score) if passing else _escape(query, params)
+    full = params.margins_m()[0]
+    keep, modify, best = _keep(query, params), None, None
+    choice = 0
+    if keep is None or keep.margin_m < full:
+        choice, best = _other(query, (full,), params)
+        if best is None:
+            modify = _modify(query, keep.margin_m if keep else -math.inf, params)
+    if best is None:
+        passing = [candidate for candidate in (keep, modify) if candidate is not None]
+        best = max(passing, key=lambda candidate: candidate.score, default=None)
+    if best is None:
+        choice, best = _other(query, params.margins_m()[1:], params)
+    best = best or _escape(query, params)
     if best is None:
         return REFUSAL
     return Verdict(
@@ -87,6 +101,7 @@ def check(query: CheckQuery, params: CheckerParams) -> Verdict:
         best.score,
         keep.score if keep else None,
         modify.score if modify else None,
+        choice,
     )
 
 
@@ -104,6 +119,16 @@ def _keep(query: CheckQuery, params: CheckerParams) -> _Candidate | None:
     if path is None:
         return None
     return _judge(VerdictKind.KEPT, path, query, params.margins_m(), params)
+
+
+def _other(query: CheckQuery, margins_m: tuple[float, ...], params: CheckerParams) -> tuple[int, _Candidate | None]:
+    """The policy's first next choice that passes as it is at one of the margins, and which one."""
+    for choice, waypoints in enumerate(query.others_ned_m, start=1):
+        path = _path(query.start_ned_m, waypoints)
+        candidate = None if path is None else _judge(VerdictKind.KEPT, path, query, margins_m, params)
+        if candidate is not None:
+            return choice, candidate
+    return 0, None
 
 
 def _modify(query: CheckQuery, beyond_m: float, params: CheckerParams) -> _Candidate | None:

@@ -44,7 +44,7 @@ def due(engaged: Engagement, state: VehicleState, percept: Percept, task: Task, 
     if state.t_s - engaged.tried_t_s < params.policy.retry_s - 1e-6:
         return False
     path = engaged.path
-    if path is None or state.t_s - path.decided_t_s >= params.policy.horizon_s - 1e-6:
+    if path is None or state.t_s - path.decided_t_s >= params.policy.path_lasts_s() - 1e-6:
         return True
     end = path.vertices_ne_m[-1]
     left_m = geometry.length(path.vertices_ne_m) - path.s_m
@@ -89,11 +89,12 @@ def settle(
         points_ned_m=percept.points_ne_m,
         proposal_ned_m=waypoints,
         escape_ned_m=None,
+        others_ned_m=() if answer.proposal is None else answer.proposal.others_ne_m,
     )
     verdict = check(asked, params.checker)
     if verdict.path_ned_m is None:
         escape = _escape(state.pos_ned_m[:2], query.goal_ne_m, percept, params)
-        verdict = check(replace(asked, escape_ned_m=escape), params.checker)
+        verdict = check(replace(asked, proposal_ned_m=None, others_ned_m=(), escape_ned_m=escape), params.checker)
     path = None
     if verdict.path_ned_m is not None and verdict.margin_m is not None:
         path = Path(verdict.path_ned_m, 0.0, verdict.margin_m, state.t_s)

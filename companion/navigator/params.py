@@ -14,7 +14,7 @@ from companion.link.lidar_params import LidarParams
 from companion.link.params import LinkParams
 from companion.perception.movers import MoverParams
 from companion.perception.perceive import PerceptionParams
-from companion.policy.expert import ExpertParams
+from companion.policy.expert import ExpertParams, GeometricExpert
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +31,16 @@ class PolicyParams:
     """Who proposes waypoints in RL mode, and how often it is asked."""
 
     name: str = param("geometric", "SN_POLICY", "Policy that proposes waypoints")
-    horizon_s: float = param(0.4, "SN_PO_HORIZON", "A path older than this is planned anew", "s", 0.05, 10.0)
+    horizon_s: float = param(0.4, "SN_PO_HORIZON", "The expert plans a path older than this anew", "s", 0.05, 10.0)
+    learned_horizon_s: float = param(3.0, "SN_PO_L_HORIZON", "The same for a learned policy", "s", 0.05, 10.0)
     retry_s: float = param(0.2, "SN_PO_RETRY", "Least time between two decisions", "s", 0.0, 5.0)
     used_up_m: float = param(1.0, "SN_PO_USED_UP", "A path with less than this left is used up", "m", 0.1, 10.0)
     lead_s: float = param(0.4, "SN_PO_LEAD", "A new path leaves the old one this far ahead", "s", 0.0, 2.0)
     rejoin_m: float = param(0.4, "SN_PO_REJOIN", "Farther off the old path than this, plan from the vehicle", "m", 0, 3)
+
+    def path_lasts_s(self) -> float:
+        """Age at which a path is due to be replaced."""
+        return self.horizon_s if self.name == GeometricExpert.name else self.learned_horizon_s
 
 
 @dataclass(frozen=True, slots=True)

@@ -230,3 +230,17 @@ def test_progress_raises_and_turning_lowers_the_score() -> None:
     away = straight * -1.0
     values = [score(path, np.zeros(2), goal, 0.5, PARAMS) for path in (straight, bent, away)]
     assert values == sorted(values, reverse=True)
+
+
+def test_where_the_first_choice_is_blocked_the_first_free_other_one_is_flown_as_it_is() -> None:
+    left, right = STRAIGHT + [0.0, -0.2], np.array([[1.0, 1.0], [2.0, 2.0], [3.0, 2.0]])
+    asked = dataclasses.replace(query(tree(2.1, 0.1)), others_ned_m=(left, right))
+    verdict = check(asked, PARAMS)
+    assert verdict.kind is VerdictKind.KEPT and verdict.choice == 2 and verdict.keep_score is None
+    assert verdict.path_ned_m is not None and verdict.path_ned_m[1:].tolist() == right.tolist()
+
+
+def test_a_first_choice_that_passes_is_flown_whatever_else_there_is() -> None:
+    verdict = check(dataclasses.replace(query(tree(2.0, 1.2)), others_ned_m=(STRAIGHT * 0.5,)), PARAMS)
+    assert verdict.choice == 0 and verdict.path_ned_m is not None
+    assert verdict.path_ned_m[1:].tolist() == STRAIGHT.tolist()
