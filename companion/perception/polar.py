@@ -108,7 +108,7 @@ def _ground_slant_m(scan: Scan, rotation: F64, height_m: float) -> F64:
     drop = forward * cosine + right * sine  # metres down per slant metre
     steepest = np.maximum(drop[:-1], drop[1:])
     steepest[_sector_of(np.array([math.atan2(right, forward)]), scan)] = most
-    slant_m = height_m / np.maximum(steepest, LEVEL)
+    slant_m: F64 = height_m / np.maximum(steepest, LEVEL)
     slant_m[steepest <= LEVEL] = np.inf
     return slant_m
 

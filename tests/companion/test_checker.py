@@ -233,7 +233,7 @@ def test_progress_raises_and_turning_lowers_the_score() -> None:
 
 
 def test_where_the_first_choice_is_blocked_the_first_free_other_one_is_flown_as_it_is() -> None:
-    left, right = STRAIGHT + [0.0, -0.2], np.array([[1.0, 1.0], [2.0, 2.0], [3.0, 2.0]])
+    left, right = STRAIGHT - np.array([0.0, 0.2]), np.array([[1.0, 1.0], [2.0, 2.0], [3.0, 2.0]])
     asked = dataclasses.replace(query(tree(2.1, 0.1)), others_ned_m=(left, right))
     verdict = check(asked, PARAMS)
     assert verdict.kind is VerdictKind.KEPT and verdict.choice == 2 and verdict.keep_score is None
