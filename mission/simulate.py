@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from companion import navigator
 from companion.core.codec import quantise_setpoint
 from companion.core.inputs import Inputs
+from companion.core.task import Task
+from companion.core.types import Setpoint
 from mission.flight_plan import FlightPlan
 from sitl.lidar import LidarParams
 from sitl.modes import FlightMode
@@ -18,6 +20,9 @@ from sitl.vehicle import Turbulence, Wind
 GROUND_LIMIT_S = 60.0  # vehicle time before OFFBOARD, at most
 
 OnRecord = Callable[[navigator.Record], None]
+Think = Callable[
+    [navigator.Memory, Inputs, Task, navigator.Params], tuple[navigator.Memory, Setpoint, navigator.Record]
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,16 +48,19 @@ def sim_config(plan: FlightPlan) -> SimConfig:
     )
 
 
-def fly_in_process(plan: FlightPlan, on_record: OnRecord | None = None) -> InProcessFlight:
+def fly_in_process(
+    plan: FlightPlan, on_record: OnRecord | None = None, think: Think = navigator.tick
+) -> InProcessFlight:
     """Fly the plan until the vehicle has landed and disarmed, or its time is over.
 
-    With ``on_record`` each record is handed over instead of kept: the maps in a flight's records fill 300 MB.
+    With ``on_record`` each record is handed over instead of kept: the maps in a flight's records fill 300 MB. ``think``
+    stands in for the navigator's tick: the same tick with another policy asked.
     """
     sim = Simulation(plan.world, sim_config(plan))
     records: list[navigator.Record] = []
     keep = records.append if on_record is None else on_record
     engaged_s: float | None = None
-    for record in ticks(sim, plan):
+    for record in ticks(sim, plan, think):
         keep(record)
         t_s = record.inputs.state.t_s
         if engaged_s is None and record.inputs.status.offboard:
@@ -63,12 +71,12 @@ def fly_in_process(plan: FlightPlan, on_record: OnRecord | None = None) -> InPro
     return InProcessFlight(sim, records, False)
 
 
-def ticks(sim: Simulation, plan: FlightPlan) -> Iterator[navigator.Record]:
+def ticks(sim: Simulation, plan: FlightPlan, think: Think = navigator.tick) -> Iterator[navigator.Record]:
     """Scan, tick, setpoint, operator; until the vehicle has flown and disarmed."""
     memory = navigator.start(plan.params)
     while not sim.finished:
         seen = sim.advance_to_scan()
-        memory, setpoint, record = navigator.tick(memory, _inputs(seen), plan.task, plan.params)
+        memory, setpoint, record = think(memory, _inputs(seen), plan.task, plan.params)
         sim.submit(quantise_setpoint(setpoint))
         yield record
         _operate(sim)
