@@ -117,7 +117,7 @@ class Autopilot:
         if self._state is not None and self._steers() and self.mode is FlightMode.OFFBOARD:
             self.demand = self.steering.demand(Behaviour.OFFBOARD, self._state, setpoint)
 
-    def command_arm(self, force: bool = False) -> CommandResult:
+    def command_arm(self, force: bool = False, reason: str = "external command") -> CommandResult:
         """MAV_CMD_COMPONENT_ARM_DISARM with 1."""
         if self.armed:
             return ACCEPTED
@@ -129,7 +129,7 @@ class Autopilot:
             self.set_home(here(self._state))
         self.armed_s = self._landed_s = self.t_s
         self.steering.restart()
-        self._say(INFO, "Armed by external command")
+        self._say(INFO, f"Armed by {reason}")
         return ACCEPTED
 
     def command_disarm(self, force: bool = False) -> CommandResult:
@@ -150,6 +150,14 @@ class Autopilot:
             return self._refuse(f"Switching to {TITLES[mode]} is currently not available")
         self._choose_mode(mode)
         return ACCEPTED
+
+    def command_mission(self) -> CommandResult:
+        """MAV_CMD_MISSION_START: fly the mission, and arm for it."""
+        if not self._navigator.mission_flyable():
+            self._say(CRITICAL, "Mission start denied! No valid mission")
+            return CommandResult(Result.DENIED)
+        chosen = self.command_mode(FlightMode.MISSION)
+        return self.command_arm(reason="mission start") if chosen.accepted else chosen
 
     def command_takeoff(self, down_m: float | None = None) -> CommandResult:
         """MAV_CMD_NAV_TAKEOFF to a local altitude; None: MIS_TAKEOFF_ALT above here."""

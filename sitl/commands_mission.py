@@ -7,16 +7,15 @@ from pymavlink.dialects.v20 import common as mav
 
 from sitl.command import ACCEPTED, DENIED, Answer, Command, Handler, answer, whole
 from sitl.link import Link
-from sitl.modes import FlightMode
 from sitl.simulation import Simulation
 
 
 def _start(command: Command, sim: Simulation, _link: Link) -> Answer:
-    """Fly the mission, from item p1 on; p2, the last item, is ignored as in PX4."""
+    """Fly the mission from item p1 on, and arm for it; p2, the last item, is ignored as in PX4. DENIED without one."""
     first = whole(command.params[0])
     if first is not None and first > 0 and not sim.autopilot.plans.jump_to(first):
         return DENIED
-    return answer(sim.autopilot.command_mode(FlightMode.MISSION))
+    return answer(sim.autopilot.command_mission())
 
 
 def _jump(command: Command, sim: Simulation, _link: Link) -> Answer:

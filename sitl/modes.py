@@ -80,8 +80,8 @@ FLYABLE: Final = frozenset(
 )
 # Modes that a pilot's stick ends (COM_RC_OVERRIDE).
 AUTONOMOUS: Final = FLYABLE - {FlightMode.OFFBOARD, FlightMode.TERMINATION} | {FlightMode.MISSION}
-# Modes in which PX4 lets the motors start; those of MANUAL too, with sticks.
-ARMABLE: Final = frozenset({FlightMode.HOLD, FlightMode.TAKEOFF, FlightMode.OFFBOARD})
+# Modes in which PX4 lets the motors start; OFFBOARD with setpoints, MISSION with one, those of MANUAL with sticks.
+ARMABLE: Final = frozenset({FlightMode.HOLD, FlightMode.TAKEOFF, FlightMode.OFFBOARD, FlightMode.MISSION})
 
 _AUTO_FLAGS: Final = (
     mav.MAV_MODE_FLAG_AUTO_ENABLED | mav.MAV_MODE_FLAG_GUIDED_ENABLED | mav.MAV_MODE_FLAG_STABILIZE_ENABLED

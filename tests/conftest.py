@@ -23,6 +23,8 @@ LIVE = {
     "test_companion_serial",
     "test_disturbed",
     "test_lidar",
+    "test_mavproxy",
+    "test_mavproxy_talk",
     "test_mission_mavsdk",
     "test_mission_server",
     "test_operator",
