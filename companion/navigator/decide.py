@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from companion.checker.checker import CheckQuery, Verdict, check, recheck
+from companion.checker.checker import CheckQuery, Verdict, check, recheck, unchecked
 from companion.core import geometry
 from companion.core.params import ParamError, nearest
 from companion.core.task import Task
@@ -16,6 +16,7 @@ from companion.navigator.memory import Engagement, Memory, Path
 from companion.navigator.params import Params
 from companion.perception.observation import observation
 from companion.perception.perceive import Percept, representatives
+from companion.policy import store
 from companion.policy.expert import ExpertParams, GeometricExpert
 from companion.policy.interface import Policy, Proposal, Query
 
@@ -29,6 +30,7 @@ class Answer:
 
     proposal: Proposal | None
     memory: F64 | None  # what it wants to see again
+    checked: bool = True  # False: flown as it is, only to measure in simulation what the checker is worth
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +93,8 @@ def settle(
         escape_ned_m=None,
         others_ned_m=() if answer.proposal is None else answer.proposal.others_ne_m,
     )
-    verdict = check(asked, params.checker)
-    if verdict.path_ned_m is None:
+    verdict = check(asked, params.checker) if answer.checked else unchecked(asked)
+    if verdict.path_ned_m is None and answer.checked:
         escape = _escape(state.pos_ned_m[:2], query.goal_ne_m, percept, params)
         verdict = check(replace(asked, proposal_ned_m=None, others_ned_m=(), escape_ned_m=escape), params.checker)
     path = None
@@ -102,15 +104,22 @@ def settle(
 
 
 def policy_named(name: str, params: Params) -> Policy:
-    """The policy of that name. Raises ParamError with the nearest name."""
-    if name != GeometricExpert.name:
-        raise ParamError(f"unknown policy '{name}'{nearest(name, [GeometricExpert.name])}")
-    return _expert(params.expert, params)
+    """The geometric expert, or a learned policy by the name of a shipped one or by its folder. Raises ParamError."""
+    if name == GeometricExpert.name:
+        return _expert(params.expert, params)
+    return _learned(name, params)
 
 
 @lru_cache(maxsize=8)
 def _expert(expert: ExpertParams, params: Params) -> Policy:
     return GeometricExpert(expert, params.map)
+
+
+@lru_cache(maxsize=8)
+def _learned(name: str, params: Params) -> Policy:
+    if not store.is_folder(name) and name not in (known := store.shipped()):
+        raise ParamError(f"unknown policy '{name}'{nearest(name, [GeometricExpert.name, *known])}")
+    return store.load_policy(name, params.map)
 
 
 def _prefix(engaged: Engagement, state: VehicleState, params: Params) -> F64:
