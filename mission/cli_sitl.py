@@ -22,9 +22,11 @@ from mission.cli_options import (
     require_extra,
 )
 from mission.errors import InputError
+from mission.processes import INSTANCE_MAX
 
 if TYPE_CHECKING:
     from sitl.vehicle import Wind
+    from sitl.vehicle_config import VehicleConfig
 
 World = Annotated[str, typer.Option(help="A world's name or a YAML file.")]
 Spawn = Annotated[tuple[float, float] | None, typer.Option(help="North and east in the world, m; default its start.")]
@@ -33,6 +35,9 @@ WindOption = Annotated[tuple[float, float], typer.Option(help="Where the air mov
 Turbulence = Annotated[str, typer.Option(help="none, light, moderate or severe; needs wind to be felt.")]
 Out = Annotated[Path | None, typer.Option("--out", help="Folder for truth and MAVLink logs; default: no logs.")]
 
+Count = Annotated[
+    int, typer.Option(min=1, max=INSTANCE_MAX + 1, help="Vehicles in this world, ports and system ids one up for each.")
+]
 Params = Annotated[Path | None, typer.Option("--params", help="File that keeps PX4 parameters over the end.")]
 
 
@@ -47,6 +52,7 @@ def sitl(
     turbulence: Turbulence = "none",
     fault: Faults = None,
     instance: Instance = 0,
+    count: Count = 1,
     params: Params = None,
     firmware: FirmwareName = "embedded",
     px4_bin: Px4Bin = None,
@@ -57,6 +63,7 @@ def sitl(
     """The vehicle alone, as PX4 would be: companion udp 14540, ground station 14550. Ends with Ctrl-C.
 
     With --firmware px4 the aircraft alone, for a real PX4 at tcp 4560; its LiDAR goes to udp 14650.
+    With --count vehicles stand 3 m apart, system ids from instance + 1; they see each other, and time is one for all.
     """
     require_extra("sitl", "sitl")
     from mission.px4_firmware import running
@@ -83,10 +90,29 @@ def sitl(
         firmware=who,
         sign_key=sign_key,
     )
+    if count > 1:
+        return _fleet(config, count, json)
     if json:
         print_json(config.to_json())
     with running(px4, instance, out):
         return run(config)
+
+
+def _fleet(config: "VehicleConfig", count: int, json: bool) -> int:
+    from sitl import fleet, formation
+    from sitl.vehicle_config import ConfigError, Firmware
+
+    if config.firmware is Firmware.PX4:
+        raise InputError("--count is for the embedded firmware: start one 'swiftnav sitl --firmware px4' for each PX4")
+    if config.instance + count - 1 > INSTANCE_MAX:
+        raise InputError(f"--count {count} from --instance {config.instance} on goes beyond instance {INSTANCE_MAX}")
+    try:
+        configs = formation.fleet(config, count)
+    except ConfigError as error:
+        raise InputError(str(error)) from error
+    if json:
+        print_json({"vehicles": [member.to_json() for member in configs]})
+    return fleet.run(configs)
 
 
 def _wind(towards_m_s: tuple[float, float], turbulence: str) -> "Wind":

@@ -31,14 +31,15 @@ ACCEPTED: Final = mav.MAV_RESULT_ACCEPTED
 class Pilot:
     """A ground station on the vehicle's GCS link."""
 
-    def __init__(self, instance: int, clock: Clock | None = None) -> None:
-        """Raises TransportError when somebody else has the port."""
+    def __init__(self, instance: int, clock: Clock | None = None, system: int = 1) -> None:
+        """``system``: id of the vehicle. Raises TransportError when somebody else has the port."""
         self.t_s = 0.0
         self.pos_ned_m = (0.0, 0.0, 0.0)
         self.custom_mode = 0
         self.armed = self.ready = False
         self.landed = LandedState.UNDEFINED
         self.texts: list[str] = []
+        self._system = system
         self._clock = clock or SystemClock()
         self._link = Connection(udp_in(HOST, GCS_PORT + instance, self._clock), *IDS, clock=self._clock)
         self._beat_s = self._clock.now_s() - HEARTBEAT_S
@@ -74,12 +75,12 @@ class Pilot:
     def command(self, number: int, *params: float) -> None:
         """Send a COMMAND_LONG; the rest of the parameters is 0."""
         filled = [*params, *[0.0] * (7 - len(params))]
-        self._link.send(mav.MAVLink_command_long_message(1, 1, number, 0, *filled))
+        self._link.send(mav.MAVLink_command_long_message(self._system, 1, number, 0, *filled))
 
     def set_integer(self, name: str, value: int) -> None:
         """Set an INT32 parameter: its bits travel as those of a float."""
         (bits,) = struct.unpack("<f", struct.pack("<i", value))
-        self._link.send(mav.MAVLink_param_set_message(1, 1, name.encode(), bits, mav.MAV_PARAM_TYPE_INT32))
+        self._link.send(mav.MAVLink_param_set_message(self._system, 1, name.encode(), bits, mav.MAV_PARAM_TYPE_INT32))
 
     def take_off(self, wall_s: float = 60.0) -> None:
         """From the ground to a hold in the air; nothing to do for a vehicle that flies. Raises FlightError."""
@@ -93,7 +94,7 @@ class Pilot:
 
     def hand_over(self, wall_s: float = 30.0) -> None:
         """OFFBOARD: the companion steers. Raises FlightError."""
-        ask = lambda: self._link.send(codec.encode_set_mode(codec.PX4_OFFBOARD, 1))  # noqa: E731
+        ask = lambda: self._link.send(codec.encode_set_mode(codec.PX4_OFFBOARD, self._system))  # noqa: E731
         self.insist(lambda: self.custom_mode == codec.PX4_OFFBOARD, ask, wall_s, "OFFBOARD")
 
     def close(self) -> None:

@@ -14,6 +14,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,6 +23,7 @@ from companion.core.keyring import KeyFileError, Keyring
 from companion.core.transport import TransportError
 from companion.core.types import F64
 from sitl import px4_app
+from sitl.airspace import Airspace
 from sitl.flight_logs import FlightLogs
 from sitl.link import SPECS, Link, bind, open_links
 from sitl.param_file import ParamFile, ParamFileError, read_param_file
@@ -38,12 +40,19 @@ PACKAGES: Final = ("swiftnav", "jsbsim", "numpy", "numba", "pymavlink", "python-
 Say = Callable[[str], None]
 
 
-def run(config: VehicleConfig, say: Say | None = None) -> int:
-    """The vehicle, until a signal. Returns the exit code. ``say`` takes one line at a time; None: stderr."""
+def run(config: VehicleConfig, say: Say | None = None, channel: Connection | None = None) -> int:
+    """The vehicle, until a signal. Returns the exit code. ``say`` takes one line at a time; None: stderr.
+
+    ``channel``: to the hub of the other vehicles in its world (``sitl.fleet``); it ends with the hub.
+    """
     tell = say or _to_stderr
-    with _stop_on_signals() as stopped, ExitStack() as stack:
+    with stop_on_signals() as stopped, ExitStack() as stack:
         try:
-            program = (_open_px4 if config.firmware is Firmware.PX4 else _open)(config, stack, tell)
+            if config.firmware is Firmware.PX4:
+                program: Server | Bridge = _open_px4(config, stack, tell)
+            else:
+                airspace = Airspace(channel, config.sim.radius_m) if channel is not None else None
+                program = _open(config, stack, tell, airspace)
         except (TransportError, KeyFileError, ConfigError) as error:
             tell(str(error))
             return EXIT_BAD_INPUT
@@ -56,11 +65,11 @@ def run(config: VehicleConfig, say: Say | None = None) -> int:
     return EXIT_OK
 
 
-def _open(config: VehicleConfig, stack: ExitStack, say: Say) -> Server:
+def _open(config: VehicleConfig, stack: ExitStack, say: Say, airspace: Airspace | None) -> Server:
     """Everything that can be refused, before anything is written."""
     clock = SystemClock()
     try:
-        sim = Simulation(config.world, config.sim)
+        sim = Simulation(config.world, config.sim, airspace.neighbours if airspace is not None else None)
     except (KeyError, ValueError) as error:
         raise ConfigError(str(error.args[0])) from error
     keyring = _open_keyring(config, clock)
@@ -78,7 +87,7 @@ def _open(config: VehicleConfig, stack: ExitStack, say: Say) -> Server:
     folder = config.log_dir or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="swiftnav-")))
     logs = FlightLogs(folder)
     stack.callback(logs.close)
-    return Server(sim, links, config.run, clock, config.system_id, truth, say, logs, param_file)
+    return Server(sim, links, config.run, clock, config.system_id, truth, say, logs, param_file, airspace)
 
 
 def _open_params(config: VehicleConfig, sim: Simulation) -> ParamFile | None:
@@ -132,7 +141,7 @@ def _open_truth(config: VehicleConfig, spawn_ned_m: F64, stack: ExitStack) -> Tr
 
 
 @contextlib.contextmanager
-def _stop_on_signals() -> Iterator[Callable[[], bool]]:
+def stop_on_signals() -> Iterator[Callable[[], bool]]:
     """A question that is answered with True once SIGINT or SIGTERM has come."""
     asked: list[int] = []
 

@@ -26,9 +26,10 @@ ORDER = (Gate.COMPANION, Gate.ARM, Gate.TAKEOFF, Gate.OFFBOARD, Gate.END)
 class GateKeeper:
     """Remembers which gates have been passed."""
 
-    def __init__(self, companion: bool = True) -> None:
-        """``companion=False`` leaves out the gate that waits for one."""
-        self._left = list(ORDER if companion else ORDER[1:])
+    def __init__(self, companion: bool = True, end: bool = True) -> None:
+        """``companion=False`` leaves out the gate that waits for one, ``end=False`` the last: others still fly."""
+        left_out = {Gate.COMPANION: not companion, Gate.END: not end}
+        self._left = [gate for gate in ORDER if not left_out.get(gate, False)]
 
     def waiting(self, simulation: Simulation, companion_heard: bool = True) -> Gate | None:
         """The gate at which vehicle time has to stand still now."""

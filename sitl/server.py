@@ -13,7 +13,8 @@ from typing import Final
 from pymavlink.dialects.v20 import common as mav
 
 from companion.core.clock import Clock
-from companion.core.transport import wait_readable
+from companion.core.transport import Waitable, wait_readable
+from sitl.airspace import Airspace
 from sitl.answers import StatusText
 from sitl.flight_logs import FlightLogs
 from sitl.gates import GateKeeper
@@ -54,30 +55,39 @@ class Server:
         say: Callable[[str], None] = lambda _text: None,
         logs: FlightLogs | None = None,
         param_file: ParamFile | None = None,
+        airspace: Airspace | None = None,
     ) -> None:
+        """``airspace``: where the other vehicles of its world are, and what time it is; None: it flies alone."""
         self.sim = sim
         sim.boot_unix_us = clock.wall_us()
         self.lockstep = config.lockstep
         self._config = config
         self._links = list(links)
-        self._transports = [link.connection.transport for link in links]
+        self._waits_on: list[Waitable] = [link.connection.transport for link in links]
+        if airspace is not None:
+            self._waits_on.append(airspace)
+        self._airspace = airspace
         self._clock = clock
         self._truth = truth
         self._logs = logs
         self._param_file = param_file
         self._voice = Voice(sim, links, say)
         self._router = Router(sim, system_id, logs)
-        self._gates = GateKeeper(companion=config.lockstep) if config.gates else None
+        self._gates = GateKeeper(companion=config.lockstep, end=airspace is None) if config.gates else None
         self._pacer = Pacer(config.speed, STEP_MS / 1e3)
         self._ahead: ScanBundle | None = None  # taken already, to be delivered after the answer to the one before
         self._flush_s = -math.inf
 
     def run(self, stopped: Callable[[], bool]) -> None:
         """Until ``stopped()``."""
-        while not stopped():
+        if self._airspace is not None:
+            self._airspace.tell(self.sim)
+        while not (stopped() or self._alone_now()):
             if self._ahead is None:
                 self._serve(0.0)
-            if self._ahead is None and self._stands():
+            if self._airspace is not None and self._airspace.waiting:
+                self._serve(POLL_WALL_S)
+            elif self._ahead is None and self._stands():
                 self._pacer.restart()
                 self._serve(POLL_WALL_S)
             elif self.lockstep:
@@ -102,7 +112,9 @@ class Server:
             self._flush_s = now_s
             self.flush()
         if timeout_s > 0.0:
-            wait_readable(self._transports, timeout_s, self._clock)
+            wait_readable(self._waits_on, timeout_s, self._clock)
+        if self._airspace is not None:
+            self._airspace.listen()
         for link in self._links:
             for message in link.connection.receive():
                 self._router.handle(link, message)
@@ -111,7 +123,15 @@ class Server:
 
     def _stands(self) -> bool:
         """Does vehicle time stand still? At a gate, and after a flight in lockstep: there is nothing to answer."""
-        return self._gate_waits() or (self.lockstep and self.sim.finished)
+        return self._gate_waits() or (self.lockstep and self._over())
+
+    def _over(self) -> bool:
+        """Has everybody flown?"""
+        return self.sim.finished if self._airspace is None else self._airspace.over(self.sim)
+
+    def _alone_now(self) -> bool:
+        """Has the hub of the other vehicles gone?"""
+        return self._airspace is not None and self._airspace.closed
 
     def _gate_waits(self) -> bool:
         gates = self._gates
@@ -121,26 +141,29 @@ class Server:
 
     def _lockstep_scan(self, stopped: Callable[[], bool]) -> None:
         """One scan and its answer. While the companion thinks, the vehicle flies on to the next scan, no further."""
+        if self._ahead is None and self._airspace is not None:
+            self._ahead = self._next_scan()  # delivered when everybody has come to its instant
+            return
         scan, self._ahead = self._ahead or self._next_scan(), None
         self._pace(scan, stopped)
         self._voice.deliver(scan)
         deadline_s = self._clock.now_s() + ANSWER_WALL_S
         if self.sim.runs_ahead and not self._stands():
             self._ahead = self._next_scan()
-        while self._router.answered_ms < scan.t_ms and not self._is_last() and not stopped():
+        while self._router.answered_ms < scan.t_ms and not self._is_last(scan) and not stopped():
             left_s = deadline_s - self._clock.now_s()
             if left_s <= 0.0:
                 self._leave_lockstep()
                 return
             self._serve(min(left_s, POLL_WALL_S))
 
-    def _is_last(self) -> bool:
-        """Is there nothing to follow the scan that was delivered? The one before the last is still answered."""
-        return self.sim.finished and self._ahead is None
+    def _is_last(self, scan: ScanBundle) -> bool:
+        """Does nobody answer the scan that was delivered? The one before the vehicle had disarmed is still answered."""
+        return scan.finished or (self.sim.finished and self._ahead is None)
 
     def _next_scan(self) -> ScanBundle:
         self.sim.advance_to_scan()
-        self._log_truth()
+        self._at_scan()
         return self._voice.bundle(with_status=True)
 
     def _pace(self, scan: ScanBundle, stopped: Callable[[], bool]) -> None:
@@ -169,13 +192,15 @@ class Server:
         if due == 0:
             self._serve(min(self._pacer.wait_s(self._clock.now_s(), step + 1), POLL_WALL_S))
         elif self.sim.advance(due) is not None:
-            self._log_truth()
+            self._at_scan()
             self._voice.deliver(self._voice.bundle(with_status=self.sim.finished))  # else it comes by wall time
         else:
             self.sim.refresh()
             self._voice.stream_by_vehicle()
 
-    def _log_truth(self) -> None:
+    def _at_scan(self) -> None:
+        if self._airspace is not None:
+            self._airspace.tell(self.sim)
         if self._logs is not None:
             self._logs.tick(self.sim)
         if self._truth is not None:

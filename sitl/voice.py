@@ -27,6 +27,7 @@ class ScanBundle:
 
     t_ms: int
     parcel: Parcel | None  # None: there is no link to a companion
+    finished: bool = False  # the vehicle had flown and disarmed
 
 
 class Voice:
@@ -46,11 +47,11 @@ class Voice:
         """What goes to the companion with the scan taken now; ``with_status``: HEARTBEAT and EXTENDED_SYS_STATE too."""
         sim, link = self._sim, self._companion
         if link is None:
-            return ScanBundle(sim.t_ms, None)
+            return ScanBundle(sim.t_ms, None, sim.finished)
         status = (messages.heartbeat(sim), messages.extended_sys_state(sim)) if with_status else ()
         state = (messages.attitude_quaternion(sim), messages.local_position_ned(sim))
         scan = (messages.obstacle_distance(sim),) if link.wall.interval_us(SCAN) else ()
-        return ScanBundle(sim.t_ms, link.connection.pack(*status, *state, *scan))
+        return ScanBundle(sim.t_ms, link.connection.pack(*status, *state, *scan), sim.finished)
 
     def deliver(self, bundle: ScanBundle) -> None:
         """To the companion, in one datagram."""
