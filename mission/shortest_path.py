@@ -23,18 +23,18 @@ PULLS = 600
 REACH_M = 30.0  # beside half the distance: how far round a way may lead
 
 
-def shortest_path_m(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> float:
+def shortest_path_m(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float, cell_m: float = CELL_M) -> float:
     """Length from (n, e) to (n, e) for a disc of ``radius_m``; inf when there is no way."""
-    path = shortest_path(world, from_ned_m, to_ned_m, radius_m)
+    path = shortest_path(world, from_ned_m, to_ned_m, radius_m, cell_m)
     return math.inf if path is None else float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
-def shortest_path(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> F64 | None:
+def shortest_path(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float, cell_m: float = CELL_M) -> F64 | None:
     """The way (k, 2) itself, or None."""
-    if _straight(world, from_ned_m, to_ned_m, radius_m):
+    if straight_free(world, from_ned_m, to_ned_m, radius_m):
         return np.stack([from_ned_m, to_ned_m])
     world = _near(world, from_ned_m, to_ned_m)
-    field, cell_m = clearance_grid(world, 2.0 * radius_m)
+    field, cell_m = clearance_grid(world, 2.0 * radius_m, cell_m)
     origin = np.array(world.bounds_m[:2])
     grid = _Grid(field, origin, cell_m, radius_m)
     ends = np.stack([from_ned_m, to_ned_m])
@@ -107,7 +107,8 @@ class _Grid:
         return along
 
 
-def _straight(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> bool:
+def straight_free(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> bool:
+    """Does a disc get straight from one place to the other?"""
     share = np.linspace(0.0, 1.0, max(2, math.ceil(math.dist(from_ned_m, to_ned_m) / CELL_M)))[1:-1, None]
     return bool(np.all(clearance_m(world, from_ned_m + share * (to_ned_m - from_ned_m)) >= radius_m))
 

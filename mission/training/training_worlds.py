@@ -121,7 +121,10 @@ def random_world(kind: str, split: str, index: int, radius_m: float = RADIUS_M) 
 class WorldSource(Protocol):
     """Where the world of a flight comes from."""
 
-    fixed: bool  # so few worlds that each is flown many times
+    @property
+    def fixed(self) -> bool:
+        """So few worlds that each is flown many times?"""
+        ...
 
     def draw(self, rng: np.random.Generator) -> World:
         """The world of the next flight."""

@@ -3,6 +3,7 @@
 World ned. A ``Site`` grows part by part; what stands too near to start or goal is left out.
 """
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 
@@ -68,7 +69,9 @@ def with_trees(site: Site, rng: np.random.Generator, density_per_m2: float, radi
     places = _places(site, rng, density_per_m2)
     radii = rng.uniform(*radius_m, size=len(places))
     trees = [(n, e, r) for (n, e), r in zip(places.tolist(), radii.tolist(), strict=True)]
-    return replace(site, circles=site.circles + tuple(tree for tree in trees if _clear(site, tree[0], tree[1], tree[2])))
+    return replace(
+        site, circles=site.circles + tuple(tree for tree in trees if _clear(site, tree[0], tree[1], tree[2]))
+    )
 
 
 def with_blocks(site: Site, rng: np.random.Generator, density_per_m2: float) -> Site:
@@ -108,7 +111,7 @@ def with_pocket(
         return back_m + forward_m * cos - right_m * sin, shift_m + forward_m * sin + right_m * cos
 
     chain = [corner(-deep_m, -half_m), corner(0.0, -half_m), corner(0.0, half_m), corner(-deep_m, half_m)]
-    walls = [wall_box(a, b, WALL_M, math.inf) for a, b in zip(chain, chain[1:], strict=False)]
+    walls = [wall_box(a, b, WALL_M, math.inf) for a, b in itertools.pairwise(chain)]
     return replace(site, boxes=site.boxes + tuple(walls))
 
 
