@@ -36,12 +36,12 @@ def clearance_m(world: World, points_ned_m: F64) -> F64:
     return nearest
 
 
-def check_world(world: World, radius_m: float = RADIUS_M, margin_m: float = MARGIN_M) -> None:
+def check_world(world: World, radius_m: float = RADIUS_M, margin_m: float = MARGIN_M, cell_m: float = CELL_M) -> None:
     """Raise WorldError when start or goal is not free for the vehicle, or no way leads from one to the other."""
     need_m = radius_m + margin_m
     for what, place in (("start", world.start_ned_m), ("goal", world.goal_ned_m)):
         _check_place(world, what, place, need_m)
-    widest_m = widest_way_m(world, need_m)
+    widest_m = widest_way_m(world, need_m, cell_m)
     if widest_m < need_m:
         best = f"the widest way has {widest_m:.2f} m to either side" if widest_m > 0.0 else "no way is open at all"
         raise WorldError(
@@ -50,11 +50,11 @@ def check_world(world: World, radius_m: float = RADIUS_M, margin_m: float = MARG
         )
 
 
-def widest_way_m(world: World, enough_m: float) -> float:
+def widest_way_m(world: World, enough_m: float, cell_m: float = CELL_M) -> float:
     """The largest clearance up to ``enough_m`` at which start and goal are connected; 0 when they never are."""
     if len(world.circles) + len(world.boxes) == 0:
         return enough_m
-    field, cell_m = clearance_grid(world, enough_m)
+    field, cell_m = clearance_grid(world, enough_m, cell_m)
     n_min, e_min, _, _ = world.bounds_m
     places = (world.start_ned_m, world.goal_ned_m)
     cells = [(round((n - n_min) / cell_m), round((e - e_min) / cell_m)) for n, e in places]
@@ -69,10 +69,10 @@ def widest_way_m(world: World, enough_m: float) -> float:
     return low
 
 
-def clearance_grid(world: World, up_to_m: float) -> tuple[F64, float]:
+def clearance_grid(world: World, up_to_m: float, cell_m: float = CELL_M) -> tuple[F64, float]:
     """Clearances (rows north, columns east, from the lower bounds) cut off at ``up_to_m``, and the cell size."""
     n_min, e_min, n_max, e_max = world.bounds_m
-    cell_m = max(CELL_M, math.sqrt((n_max - n_min) * (e_max - e_min) / CELLS_MAX))
+    cell_m = max(cell_m, math.sqrt((n_max - n_min) * (e_max - e_min) / CELLS_MAX))
     north = np.arange(n_min, n_max + cell_m / 2, cell_m)
     east = np.arange(e_min, e_max + cell_m / 2, cell_m)
     field = np.full((len(north), len(east)), up_to_m)
