@@ -4,6 +4,7 @@
 """
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from companion.policy import decoder
 from companion.policy.decoder import ACTION_SIZE, DecoderParams
 from companion.policy.expert import GeometricExpert
 from companion.policy.interface import Policy, Proposal, Query
-from companion.policy.store import folder_of, load_policy, shipped
+from companion.policy.store import is_folder, load_policy, shipped
 from mission.errors import InputError
 
 STRAIGHT, RANDOM = "straight", "random"
@@ -67,7 +68,7 @@ def check_policy(name: str) -> None:
     known = [*BASELINES, *shipped()]
     if name in known:
         return
-    if "/" not in name:
+    if not is_folder(name):
         raise InputError(f"unknown policy '{name}'{nearest(name, known)}")
-    if not folder_of(name).is_dir():
+    if not Path(name).is_dir():
         raise InputError(f"policy folder '{name}' does not exist")

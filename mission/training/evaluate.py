@@ -1,7 +1,6 @@
 """How does a policy fly?  Greedy flights of whole missions in process, judged by the truth as every flight is.
 
-Take-off to touchdown, success as the mission asks for it. A flight is a function of (policy, world, seed), and of the
-parameters: with the guard on, the geometric expert's proposal is one more candidate of the checker.
+Take-off to touchdown, success as the mission asks for it. A flight is a function of (policy, guard, world, seed).
 """
 
 import functools
@@ -42,7 +41,12 @@ class EvalSpec:
 
     policy: str  # a shipped name, a folder, or a baseline
     world: str  # a mission, a world file or a generator
-    overrides: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the companion's parameters
+    guard: bool = False  # the geometric expert's proposal is one more candidate of the checker
+
+    def overrides(self) -> dict[str, dict[str, Any]]:
+        """Of the companion's parameters: the expert's paths last less long than those of others."""
+        guard = {"guard": True} if self.guard else {}
+        return {"policy": {"name": self.policy, **guard}}
 
 
 @dataclass(slots=True)
@@ -93,7 +97,7 @@ def fly_many(spec: EvalSpec, seeds: Sequence[int], jobs: int = 1) -> Iterator[Fl
 
 def fly_one(spec: EvalSpec, seed: int) -> FlightFigures:
     """One flight, judged. Raises InputError or ParamError about what cannot be flown."""
-    plan = plan_in(spec.world, seed, spec.overrides)
+    plan = plan_in(spec.world, seed, spec.overrides())
     return fly_plan(plan, policy_for(spec.policy, plan.params, seed))
 
 

@@ -89,14 +89,6 @@ def member_line(member: Member) -> str:
     return f"seed {member.seed} {member.state}  {figures}{trouble}"
 
 
-def shares_line(statuses: Sequence[Status]) -> str:
-    """Where the wall time went, over all seeds."""
-    wall_s = sum(status.wall_s for status in statuses)
-    names = dict.fromkeys(name for status in statuses for name in status.shares)
-    parts = {name: sum(s.shares.get(name, 0.0) * s.wall_s for s in statuses) / max(wall_s, 1e-9) for name in names}
-    return "wall time: " + ", ".join(f"{name} {share:.0%}" for name, share in parts.items())
-
-
 def _trouble(member: Member) -> str:
     return member.error or (member.status.note if member.status else "")
 

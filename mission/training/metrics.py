@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 from torch.utils.tensorboard import SummaryWriter
 
 from companion.core.params import nearest
+from mission.errors import FlightError
 from mission.flight_log import read_rows
 
 FILES = ("episodes", "updates", "evaluations", "tracks")
@@ -25,12 +26,15 @@ class Metrics:
     """Row files of one seed, open for appending."""
 
     def __init__(self, folder: Path, sizes: dict[str, int] | None = None) -> None:
-        """``sizes`` in bytes, as ``flush`` gave them to a checkpoint; None: begin anew."""
+        """``sizes`` in bytes, as ``flush`` gave them to a checkpoint; None: begin anew. Raises FlightError."""
         self._files: dict[str, BinaryIO] = {}
         for name in FILES:
             path = rows_file(folder, name)
             path.touch()
-            os.truncate(path, (sizes or {}).get(name, 0))
+            size = (sizes or {}).get(name, 0)
+            if path.stat().st_size < size:
+                raise FlightError(f"{path} is shorter than when the checkpoint was written")
+            os.truncate(path, size)
             self._files[name] = path.open("ab")
         board = folder / "tensorboard"
         for old in board.glob("events.*"):

@@ -87,6 +87,10 @@ class Explorer(Protocol):
         ...
 
 
+def _none() -> float:
+    return 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class Parts:
     """One seed, put together."""
@@ -96,4 +100,7 @@ class Parts:
     memory: Memory
     explorer: Explorer
     evaluate: Evaluate | None = None
+    mirror: Callable[[Any], Any] | None = None  # a batch with half of it mirrored
+    teacher: Callable[[dict[str, Any]], F32] | None = None  # what the expert would do now, given the last ``info``
+    physics_s: Callable[[], float] = _none  # wall time that the environment has spent in physics so far
     stopwatch: Stopwatch = field(default_factory=Stopwatch)

@@ -27,6 +27,11 @@ class Stopwatch:
             if self._open:
                 self._open[-1] = (self._open[-1][0], now_s)
 
+    def move(self, seconds: float, old: str, new: str) -> None:
+        """Count so much of the time under ``old`` as ``new`` instead."""
+        self.seconds[old] = self.seconds.get(old, 0.0) - seconds
+        self.seconds[new] = self.seconds.get(new, 0.0) + seconds
+
     def shares(self) -> dict[str, float]:
         """Fractions of the sum, by name."""
         total_s = sum(self.seconds.values())

@@ -7,47 +7,24 @@ checkpoint, with the same outcome, and ends with the weights of a run that was n
 
 import json
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from mission.training.checkpoint import State, fingerprint, load_newest, save, write_whole
 from mission.training.metrics import Metrics
-from mission.training.parts import Parts
+from mission.training.parts import F32, Parts
 from mission.training.status import Progress, Status
+from mission.training.until import TrainingConfig, Until
 
 WINDOW = 15  # episodes of the paper's moving averages
 RESULT = "result.json"
+PREFILL = 10**9  # the teacher's flights are numbered from here
 
-
-@dataclass(frozen=True, slots=True)
-class TrainingConfig:
-    """How often what is done."""
-
-    batch: int = 128
-    updates_per_decision: int = 1
-    warmup_decisions: int = 128  # in the replay memory before the first update
-    checkpoint_every: int = 5  # episodes
-    evaluate_every: int = 25  # episodes; 0: never
-    evaluation_flights: int = 10
-
-    def __post_init__(self) -> None:
-        for name in ("batch", "updates_per_decision", "warmup_decisions", "checkpoint_every", "evaluation_flights"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"'{name}' = {getattr(self, name)} wants at least 1")
-        if self.evaluate_every < 0:
-            raise ValueError(f"'evaluate_every' = {self.evaluate_every} wants at least 0")
-
-
-@dataclass(frozen=True, slots=True)
-class Until:
-    """When training ends: so many successes, or so many episodes."""
-
-    successes: int = 100
-    episodes: int = 1000
+T = TypeVar("T")
 
 
 class Trainer:
@@ -79,6 +56,7 @@ class Trainer:
         """Train to the end. Raises FlightError where a checkpoint cannot be written."""
         with self._watch.part("rest"):
             if not self._begun:
+                self._prefill()
                 self._evaluate()
                 self._save()
             while not self.finished:
@@ -113,26 +91,55 @@ class Trainer:
         """One episode with its updates, and its rows."""
         parts, number = self._parts, self.progress.episodes
         parts.explorer.start_episode(number)
-        with self._watch.part("physics"):
-            obs, info = parts.env.reset(seed=episode_seed(self._seed, number))
+        obs, info = self._reset(number)
         total, figures, ended = 0.0, _Means(), False
         while not ended:
             action = parts.explorer.explore(parts.learner.act(obs), info)
-            with self._watch.part("physics"):
-                next_obs, reward, terminated, truncated, info = parts.env.step(action)
-            parts.memory.add(obs, action, float(reward), next_obs, info["discount"], terminated)
-            total, obs, ended = total + float(reward), next_obs, terminated or truncated
+            next_obs, info, reward, ended = self._step(obs, action)
+            total, obs = total + reward, next_obs
             self.progress = replace(self.progress, decisions=self.progress.decisions + 1)
             if len(parts.memory) >= self._config.warmup_decisions:
                 with self._watch.part("updates"):
                     self._update(figures)
         self._account(info, total, figures)
 
+    def _reset(self, number: int) -> tuple[F32, dict[str, Any]]:
+        seed = episode_seed(self._seed, number)
+        obs, info = self._flown(lambda: self._parts.env.reset(seed=seed))
+        return obs, info
+
+    def _step(self, obs: F32, action: F32) -> tuple[F32, dict[str, Any], float, bool]:
+        """Fly one decision and keep the transition: the next observation, info, reward, whether it was the last."""
+        parts = self._parts
+        next_obs, gained, terminated, truncated, info = self._flown(lambda: parts.env.step(action))
+        reward, discount = float(gained), float(info["discount"])
+        parts.memory.add(obs, action, reward, next_obs, discount, terminated)
+        return next_obs, info, reward, terminated or truncated
+
+    def _flown(self, fly: Callable[[], T]) -> T:
+        """What the environment answers; its wall time counts as the navigator's but for the physics in it."""
+        before_s = self._parts.physics_s()
+        with self._watch.part("navigator"):
+            answer = fly()
+        self._watch.move(self._parts.physics_s() - before_s, "navigator", "physics")
+        return answer
+
+    def _prefill(self) -> None:
+        """Flights of the teacher, kept before the first episode."""
+        parts = self._parts
+        if parts.teacher is None:
+            return
+        for flight in range(self._config.prefill_flights):
+            obs, info = self._reset(PREFILL + flight)
+            ended = False
+            while not ended:
+                obs, info, _, ended = self._step(obs, parts.teacher(info))
+
     def _update(self, figures: "_Means") -> None:
         parts = self._parts
         for _ in range(self._config.updates_per_decision):
             batch = parts.memory.sample(self._config.batch)
-            outcome = parts.learner.update(batch)
+            outcome = parts.learner.update(batch if parts.mirror is None else parts.mirror(batch))
             parts.memory.update_priorities(batch.indices, outcome["td_errors"])
             figures.add(outcome)
         self.progress = replace(self.progress, updates=self.progress.updates + self._config.updates_per_decision)
@@ -147,10 +154,11 @@ class Trainer:
             successes=self.progress.successes + success,
             ticks=self.progress.ticks + int(flown.get("ticks", 0)),
         )
+        total = float(flown.get("return", total))
         self._recent.append((success, float(flown["steps"]), total))
         number = self.progress.episodes
         counts = {"episode": number, "successes": self.progress.successes, "epsilon": self._parts.explorer.epsilon}
-        self._metrics.add("episodes", {**counts, "return": total, **_plain(flown)})
+        self._metrics.add("episodes", {**counts, **_plain(flown), "return": total})
         if figures.count:
             self._metrics.add("updates", {"episode": number, "updates": self.progress.updates, **figures.means()})
         if track is not None:

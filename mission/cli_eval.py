@@ -1,0 +1,118 @@
+"""``swiftnav eval`` and ``swiftnav export``: how good is a policy, and how does it leave the house?"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mission.cli_options import Json, print_json, require_extra
+from mission.errors import InputError
+
+if TYPE_CHECKING:
+    from mission.training.scores import FlightFigures
+
+SWITCH = {"on": True, "off": False}
+RATES = ("success", "contact", "timeout")
+SUMMED_UP = (
+    ("spl", "success weighted by path length"),
+    ("path_ratio", "flown to shortest, successes"),
+    ("time_s", "take-over to touchdown, successes"),
+    ("min_clearance_m", "least of all flights"),
+    ("p05_clearance_m", "of the flights' least"),
+    ("jerk_m2_s6", "mean square"),
+    ("switches_per_min", "of nav modes"),
+    ("switches_bound_per_min", "what the arbiter guarantees"),
+    ("kept", "verdicts of the checker, share"),
+    ("modified", ""),
+    ("escape", ""),
+    ("refused", ""),
+    ("rl_share", "of the time in RL mode"),
+    ("decision_p50_ms", "wall time of a tick with a decision"),
+    ("decision_p99_ms", ""),
+)
+
+PolicyName = Annotated[str, typer.Argument(help="A shipped policy, a folder, or geometric, straight, random.")]
+World = Annotated[str, typer.Option(help="A mission, a world file, or a random kind such as barrier or forest.")]
+Episodes = Annotated[int, typer.Option("--episodes", min=1, max=100_000, help="Flights.")]
+FirstSeed = Annotated[int, typer.Option("--seed", min=0, max=2**31, help="Of the first flight; then one up each.")]
+Guard = Annotated[str, typer.Option(help="on: the geometric expert's proposal is one more candidate of the checker.")]
+Jobs = Annotated[int, typer.Option(min=1, max=64, help="Processes.")]
+
+
+def evaluate(
+    policy: PolicyName,
+    world: World = "trajectory2",
+    episodes: Episodes = 20,
+    seed: FirstSeed = 0,
+    guard: Guard = "off",
+    jobs: Jobs = 1,
+    json: Json = False,
+) -> None:
+    """Fly a policy greedily over whole missions in process, judge every flight, sum up with 95 % Wilson intervals."""
+    require_extra("sitl", "eval")
+    if guard not in SWITCH:
+        raise InputError(f"--guard '{guard}' wants on or off")
+    from mission.training.baselines import check_policy
+    from mission.training.evaluate import EvalSpec, fly_many
+    from mission.training.flights import plan_in
+    from mission.training.scores import summary
+
+    check_policy(policy)
+    spec = EvalSpec(policy, world, SWITCH[guard])
+    plan_in(world, seed, spec.overrides())  # mistakes are told before processes start
+    flights = _shown(fly_many(spec, range(seed, seed + episodes), jobs), episodes, f"{policy} in {world}", json)
+    settings = {"policy": policy, "world": world, "guard": SWITCH[guard], "seed": seed}
+    figures = {**settings, **summary(flights)}
+    if json:
+        print_json(figures)
+    else:
+        _print(figures)
+
+
+def export(
+    policy: Annotated[str, typer.Argument(help="A shipped policy or a folder.")],
+    onnx: Annotated[Path, typer.Option(metavar="FILE", help="ONNX file to write.")],
+    json: Json = False,
+) -> None:
+    """Write a policy's actor as ONNX, and compare what the file computes with what flies."""
+    require_extra("train", "export")
+    from mission.training.export import export_onnx
+
+    facts = export_onnx(policy, onnx)
+    if json:
+        print_json(facts)
+        return
+    for key, value in facts.items():
+        typer.echo(f"{key:20} {value}")
+
+
+def _shown(flights: Any, count: int, title: str, quiet: bool) -> "list[FlightFigures]":
+    """All of them, with a bar while they fly."""
+    from rich.console import Console
+    from rich.progress import track
+
+    console = Console(stderr=True, highlight=False, quiet=quiet)
+    return list(track(flights, title, count, console=console))
+
+
+def _print(figures: dict[str, Any]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    guard = "on" if figures["guard"] else "off"
+    table = Table(
+        title=f"{figures['policy']} in {figures['world']}, guard {guard}, {figures['episodes']} flights",
+        title_justify="left",
+    )
+    for name, justify in (("figure", "left"), ("value", "right"), ("", "left")):
+        table.add_column(name, justify="right" if justify == "right" else "left")
+    for name in RATES:
+        low, high = figures[f"{name}_ci95"]
+        table.add_row(name, f"{figures[name]:.3f}", f"[{low:.3f}, {high:.3f}]")
+    for name, text in SUMMED_UP:
+        value = figures[name]
+        table.add_row(name, "-" if value is None else f"{value:.3f}", text)
+    console.print(table)
+    for failure in figures["failures"]:
+        console.print(f"  seed {failure['seed']} in {failure['world']}: {failure['reason']}", markup=False)
