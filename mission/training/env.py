@@ -18,7 +18,7 @@ from companion.policy.observations import SIZES, observe
 from mission.errors import InputError
 from mission.training.env_config import EnvConfig, flight_spec, navigator_params
 from mission.training.episode import Episode
-from mission.training.flight import End
+from mission.training.flight import End, Flight
 from mission.training.path_ratio import path_ratio
 from mission.training.training_worlds import Worlds, world_source
 from sitl.world import World
@@ -70,8 +70,14 @@ class SwiftNavEnv(gymnasium.Env[F32, F32]):
         self._radius_m = self._params.vehicle.radius_m
         self._source = world_source(world, self._radius_m)
         self._episode: Episode | None = None
+        self._physics_s = 0.0  # of earlier flights
         self.observation_space = spaces.Box(-np.inf, np.inf, (SIZES[self.config.observation],), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
+
+    @property
+    def flight(self) -> Flight:
+        """The flight under way: truth, for pictures and tests."""
+        return self._flying.flight
 
     @property
     def query(self) -> Query:
@@ -81,6 +87,11 @@ class SwiftNavEnv(gymnasium.Env[F32, F32]):
             raise RuntimeError("the flight is over: reset first")
         return query
 
+    @property
+    def physics_s(self) -> float:
+        """Wall time spent in the simulator so far."""
+        return self._physics_s + (0.0 if self._episode is None else self._episode.flight.physics_s)
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[F32, dict[str, Any]]:
         """The first decision of the next flight that has one."""
         super().reset(seed=seed)
@@ -88,6 +99,7 @@ class SwiftNavEnv(gymnasium.Env[F32, F32]):
         while len(skipped) < FLIGHTS_MAX:
             world = self._world((options or {}).get("world"))
             flight_seed = int(self.np_random.integers(2**31))
+            self._physics_s = self.physics_s
             self._episode = Episode(
                 flight_spec(world, flight_seed, self.config, self._params), self.config.until, self.config.checker
             )

@@ -6,6 +6,7 @@ measured. Vehicle time only: a flight is a function of its plan and of the answe
 """
 
 import math
+import time
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -80,6 +81,7 @@ class Flight:
         self.log = Log()
         self.earned = Earned()
         self.engaged_t_s: float | None = None
+        self.physics_s = 0.0  # wall time spent in the simulator: for people, it decides nothing
         self._goal_ne_m: list[float] = spec.plan.world.goal_ned_m.tolist()
         self._spawn_ned_m: list[float] = self.sim.spawn_ned_m.tolist()
         self._state: RewardState | None = None
@@ -105,7 +107,7 @@ class Flight:
         """Arm and climb, as far as the height of the task; the first scan up there."""
         sim, autopilot = self.sim, self.sim.autopilot
         while sim.t_s < GROUND_LIMIT_S:
-            seen = sim.advance_to_scan()
+            seen = self.next_scan()
             if autopilot.has_flown and seen.state.pos_ned_m[2] < self._down_m() + UP_M:
                 return seen
             if not autopilot.armed and autopilot.ready:
@@ -122,7 +124,10 @@ class Flight:
 
     def next_scan(self) -> Observation:
         """Fly on to the next scan."""
-        return self.sim.advance_to_scan()
+        began_s = time.perf_counter()
+        seen = self.sim.advance_to_scan()
+        self.physics_s += time.perf_counter() - began_s
+        return seen
 
     def answer(self, setpoint: Setpoint) -> None:
         """A companion's answer, as it arrives by the wire."""
