@@ -56,6 +56,7 @@ class Cause(Enum):
     BATTERY_CRITICAL = "battery critical"
     BATTERY_EMERGENCY = "battery emergency"
     ATTITUDE = "attitude failure"
+    MOTOR = "motor failure"
     FALLBACK = "mode cannot go on"
 
 
@@ -99,6 +100,7 @@ class Facts:
     breached: bool = False
     charge: Charge = Charge.FINE
     attitude_failed: bool = False
+    motor_failed: bool = False
     position_ok: bool = True
     attitude_ok: bool = True
     needs_position: bool = True  # can the user's mode not go on without it?
@@ -140,6 +142,12 @@ _GEOFENCE: Final = {  # GF_ACTION
     4: Response(Action.TERMINATE, Takeover.NEVER, Clears.NEVER),
     5: Response(Action.LAND, clears=Clears.ON_MODE_CHANGE),
 }
+_MOTOR: Final = {  # COM_ACT_FAIL_ACT
+    1: Response(Action.HOLD),
+    2: Response(Action.LAND, clears=Clears.ON_MODE_CHANGE),
+    3: Response(Action.RETURN, clears=Clears.ON_MODE_CHANGE),
+    4: Response(Action.TERMINATE, clears=Clears.NEVER),
+}
 _BATTERY: Final = {  # COM_LOW_BAT_ACT: at critical charge, at emergency
     1: (Action.RETURN, Action.RETURN),
     2: (Action.LAND, Action.LAND),
@@ -169,6 +177,8 @@ def responses(facts: Facts, params: ParamStore) -> Mapping[Cause, Response]:
         found[_BATTERY_CAUSES[facts.charge]] = Response(_battery(facts.charge, int(params["COM_LOW_BAT_ACT"])))
     if facts.attitude_failed:
         found[Cause.ATTITUDE] = Response(_attitude(facts, params))
+    if facts.motor_failed:
+        found[Cause.MOTOR] = _MOTOR.get(int(params["COM_ACT_FAIL_ACT"]), Response(Action.WARN))
     fallback = _fallback(facts, params)
     if fallback is not Action.NONE:
         found[Cause.FALLBACK] = Response(fallback, Takeover.ALWAYS)

@@ -43,6 +43,7 @@ class Guardian:
         self.position_ok = True  # told by the estimator
         self.attitude_ok = True
         self.sensors_ok = True
+        self.motors_ok = True  # told by the motors' controllers
         self.charge = Charge.FINE
         self.breach: Breach | None = None
         self._store = store
@@ -54,6 +55,7 @@ class Guardian:
         self._gcs_lost = False
         self._tilted_since_s = math.inf
         self._attitude_failed = False
+        self._motor_failed = False
 
     @property
     def fit(self) -> bool:
@@ -84,6 +86,7 @@ class Guardian:
         self._watch_fence(state, facts.armed)
         self._watch_charge(facts.armed)
         self._watch_attitude(state, facts.armed)
+        self._watch_motors(facts.armed)
         action = self._keeper.update(facts if self._all_well() else self._completed(facts))
         if self._keeper.text is not None:
             self._say(StatusText(CRITICAL, self._keeper.text))
@@ -92,7 +95,8 @@ class Guardian:
     def _all_well(self) -> bool:
         """Nothing to add to the commander's facts? Nearly always: building them anew would be the dearest step here."""
         told = self.position_ok and self.attitude_ok and not (self._gcs_lost or self.gcs_blocked)
-        return told and self.charge is Charge.FINE and self.breach is None and not self._attitude_failed
+        failed = self._attitude_failed or self._motor_failed
+        return told and self.charge is Charge.FINE and self.breach is None and not failed
 
     def _completed(self, facts: Facts) -> Facts:
         return replace(
@@ -101,6 +105,7 @@ class Guardian:
             breached=self.breach is not None,
             charge=self.charge,
             attitude_failed=self._attitude_failed,
+            motor_failed=self._motor_failed,
             position_ok=self.position_ok,
             attitude_ok=self.attitude_ok,
         )
@@ -132,6 +137,12 @@ class Guardian:
         if failed and not self._attitude_failed:
             self._say(StatusText(CRITICAL, "Attitude failure detected"))
         self._attitude_failed = failed
+
+    def _watch_motors(self, armed: bool) -> None:
+        failed = armed and not self.motors_ok and bool(self._params["FD_ACT_EN"])
+        if failed and not self._motor_failed:
+            self._say(StatusText(CRITICAL, "Motor failure detected"))
+        self._motor_failed = failed
 
 
 def _beyond(angle_rad: float, limit_deg: float) -> bool:

@@ -25,6 +25,9 @@ HONOURED: Final[Mapping[str, Px4Param]] = {
     "BAT_EMERGEN_THR": Px4Param(0.05, "", "emergency charge", 0.03, 0.5),
     "BAT_LOW_THR": Px4Param(0.15, "", "low charge", 0.12, 0.5),
     "CBRK_FLIGHTTERM": Px4Param(121212, "", "circuit breaker of flight termination", 0, 121212),
+    "COM_ACT_FAIL_ACT": Px4Param(
+        0, "", "on failure of a motor: 0 warning, 1 Hold, 2 Land, 3 Return, 4 Terminate", 0, 4
+    ),
     "COM_DISARM_LAND": Px4Param(2.0, "s", "disarm this long after landing; not above 0: never", -1, 20),
     "COM_DISARM_PRFLT": Px4Param(10.0, "s", "disarm this long after arming without take-off; not above 0: never", -1),
     "COM_DL_LOSS_T": Px4Param(10, "s", "a ground station silent for longer is lost", 5, 300),
@@ -47,6 +50,7 @@ HONOURED: Final[Mapping[str, Px4Param]] = {
     "COM_RC_OVERRIDE": Px4Param(1, "", "bit 0: moving a stick ends an autonomous mode in Position", 0, 3),
     "COM_RC_STICK_OV": Px4Param(30.0, "%", "how far a stick has to move for that", 5, 80),
     "COM_SPOOLUP_TIME": Px4Param(1.0, "s", "motors idle this long between arming and climbing", 0, 30),
+    "FD_ACT_EN": Px4Param(1, "", "failure detector: 1 watches the motors", 0, 1),
     "FD_FAIL_P": Px4Param(60, "deg", "failure detector: pitch", 0, 180),
     "FD_FAIL_R": Px4Param(60, "deg", "failure detector: roll", 0, 180),
     "FLW_TGT_ALT_M": Px4Param(
@@ -116,7 +120,6 @@ KEPT: Final[Mapping[str, Px4Param]] = {
     "CA_AIRFRAME": Px4Param(0, "", "multirotor"),
     "CA_ROTOR_COUNT": Px4Param(4, "", "rotors", 0, 12),
     "CBRK_SUPPLY_CHK": Px4Param(894281, "", "circuit breaker of the supply check", 0, 894281),
-    "COM_ACT_FAIL_ACT": Px4Param(0, "", "action on actuator failure", 0, 3),
     "COM_ARM_MIS_REQ": Px4Param(0, "", "1: arming needs a mission", 0, 1),
     "COM_ARM_WO_GPS": Px4Param(1, "", "arming without GPS: 0 refused, 1 warned, 2 silent", 0, 2),
     "COM_FLTMODE1": Px4Param(-1, "", "mode of the first switch position", -1),

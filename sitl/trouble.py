@@ -49,6 +49,7 @@ class Trouble:
         guardian.position_ok = self.errors.position_ok
         guardian.attitude_ok = self.errors.attitude_ok
         guardian.sensors_ok = not any(name in SENSORS_OFF for name in self.active)
+        guardian.motors_ok = min(self._motors) > 0.0
         guardian.gcs_blocked = "gcs_off" in self.active
 
     def estimate(self, t_s: float, truth: Truth) -> VehicleState:
