@@ -20,6 +20,7 @@ from companion.core.inputs import Inputs
 from companion.core.types import F64, NavMode
 from companion.guidance import line
 from companion.navigator.decide import question
+from companion.navigator.memory import Engagement
 from companion.policy.interface import Proposal, Query
 from mission.training.flight import HANDOVER_S, Flight, FlightSpec
 from mission.training.reward import TickFacts
@@ -58,6 +59,7 @@ class Episode:
         self._memory = navigator.start(self._params)
         self._endpoint: tuple[float, float] | None = None
         self._asked_in_rl = False
+        self._engaged: Engagement | None = None
         self._pending = self._hover()
         self._advance()
 
@@ -74,9 +76,9 @@ class Episode:
     def last_view(self) -> Query:
         """What would be asked at this instant: a decision after the last, to bootstrap from."""
         pending = self._pending
-        assert pending.engaged is not None  # the flight has been handed over
-        task, params = self.flight.spec.plan.task, self._params
-        return question(pending.engaged, pending.inputs.state, pending.percept, task, params)
+        engaged = pending.engaged or self._engaged  # disarmed: as it was in flight
+        assert engaged is not None  # the flight has been handed over
+        return question(engaged, pending.inputs.state, pending.percept, self.flight.spec.plan.task, self._params)
 
     def decide(self, proposal: Proposal | None, memory: F64 | None) -> None:
         """Answer the question and fly on to the next one, or to the end."""
@@ -164,6 +166,7 @@ class Episode:
         engaged, modes = pending.engaged, self._modes
         if engaged is None:
             return
+        self._engaged = engaged
         t_s, in_rl = pending.inputs.state.t_s, engaged.arbiter.mode == NavMode.RL
         if in_rl:
             modes.rl_time_s += t_s - self._memory.t_s

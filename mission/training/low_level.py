@@ -76,6 +76,13 @@ class SwiftNavLowLevelEnv(gymnasium.Env[F32, F32]):
         self.observation_space = spaces.Box(-np.inf, np.inf, (SIZES[self.config.observation],), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
 
+    @property
+    def flight(self) -> Flight:
+        """The flight under way: truth, for pictures and tests."""
+        if self._flight is None:
+            raise RuntimeError("no flight yet: reset first")
+        return self._flight
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[F32, dict[str, Any]]:
         """Take off and hand over."""
         super().reset(seed=seed)
@@ -92,13 +99,14 @@ class SwiftNavLowLevelEnv(gymnasium.Env[F32, F32]):
         flight.hand_over()
         seen = self._tick(flight, seen, STILL)
         flight.take_earned()
-        return self._observed(seen), {"discount": 1.0, "ticks": 0, "flights_without_decision": 0, "skipped": []}
+        info = {"flights_without_decision": 0, "skipped": [], "entered": True, "discount": 1.0, "ticks": 0}
+        return self._observed(seen), info
 
     def step(self, action: F32) -> tuple[F32, float, bool, bool, dict[str, Any]]:
         """Fly the action for ``hold_ticks`` scans or to the end."""
-        flight = self._flight
-        if flight is None or flight.end is not None:
-            raise RuntimeError("no flight under way: reset first")
+        flight = self.flight
+        if flight.end is not None:
+            raise RuntimeError("the flight is over: reset first")
         wanted = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
         self._decisions += 1
         for _ in range(self._hold_ticks):
@@ -106,7 +114,7 @@ class SwiftNavLowLevelEnv(gymnasium.Env[F32, F32]):
             if flight.end is not None:
                 break
         earned = flight.take_earned()
-        info: dict[str, Any] = {"discount": earned.discount, "ticks": earned.ticks}
+        info: dict[str, Any] = {"discount": earned.discount, "ticks": earned.ticks, "entered": False}
         end: End | None = flight.end
         if end is not None:
             ratio = path_ratio(flight, self._source.fixed)
@@ -149,8 +157,7 @@ class SwiftNavLowLevelEnv(gymnasium.Env[F32, F32]):
         return flatten(seen.scan, seen.state, perception.lidar_up_m, perception.ground_margin_m).bearing_range_m
 
     def _observed(self, seen: Observation) -> F32:
-        assert self._flight is not None
-        state, goal_ne_m = seen.state, self._flight.spec.plan.task.goal_ned_m
+        state, goal_ne_m = seen.state, self.flight.spec.plan.task.goal_ned_m
         near_ne_m = representatives(self._bearing_range_m(seen), state, self._params.perception.sense_radius_m)
         query = Query(
             state,
