@@ -37,6 +37,24 @@ ANSWERS: Final = {
     "SERIAL_CONTROL": "the shell's prompt",
     "STATUSTEXT": "PX4's texts, in chunks when longer than 50 bytes",
 }
+# Understood, and without effect here.
+IDLE: Final = {
+    "OBSTACLE_DISTANCE, DISTANCE_SENSOR": "the vehicle has its own LiDAR; PX4 prevents collisions under sticks only",
+    "STATUSTEXT, SYSTEM_TIME": "heard",
+    "REQUEST_DATA_STREAM": "rates are set by SET_MESSAGE_INTERVAL",
+    "GPS_RTCM_DATA, PLAY_TUNE, PLAY_TUNE_V2": "there is no receiver and no buzzer",
+    "VISION_POSITION_ESTIMATE, ATT_POS_MOCAP, ODOMETRY": "the estimate takes no external vision",
+    "ADSB_VEHICLE, RADIO_STATUS, TRAJECTORY_REPRESENTATION_WAYPOINTS": "as PX4 without such a device",
+    "REQUEST_EVENT": "no events are sent",
+    "Commands addressed to a camera, gimbal or winch": "silence: no such component is there, as with a bare PX4",
+}
+# PX4 sends these; the vehicle does not. A request is DENIED, a rate FAILED.
+NOT_SENT: Final = {
+    "EVENT, CURRENT_EVENT_SEQUENCE": "every event is a STATUSTEXT as well, without the tab that lets it be dropped",
+    "COMPONENT_METADATA, COMPONENT_INFORMATION": "there are no files to point to",
+    "LINK_NODE_STATUS, RC_CHANNELS, ESC_STATUS, TIME_ESTIMATE_TO_TARGET": "no source for them",
+    "PARAM_ERROR": "newer than PX4 v1.16",
+}
 REST: Final = """\
 * Any other command: COMMAND_ACK with UNSUPPORTED. A command for another system or component: silence.
 * Any other message, known or not: ignored silently. So are bytes that are no packet.
@@ -55,6 +73,8 @@ def page() -> str:
         ("Also sent:", _table(("message", "when"), ANSWERS.items())),
         ("## What it understands", _table(("id", "message", "what happens"), _understood())),
         ("## Commands", _table(("id", "command", "answer"), _commands())),
+        ("## Understood, without effect", _table(("message", "why"), IDLE.items())),
+        ("## Not sent", _table(("message", "why"), NOT_SENT.items())),
         ("## Everything else", REST),
         ("## Flight modes", _table(("custom_mode", "mode", "arms", "can be chosen in flight"), _modes())),
         ("## Parameters that change what it does", _params(HONOURED)),

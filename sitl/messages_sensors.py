@@ -22,6 +22,8 @@ Message = Any  # a MAVLink_*_message object
 FIELD_NED_GAUSS: Final = field_ned_gauss()
 ALL_FIELDS: Final = 0x1FFF  # HIGHRES_IMU
 PWM_OFF, PWM_MIN, PWM_MAX = 900, 1000, 2000  # PX4's SITL outputs
+UNKNOWN_VARIANCE_CM2: Final = 255  # DISTANCE_SENSOR
+GOOD_SIGNAL, INVALID_SIGNAL = 100, 1
 UNKNOWN_COVARIANCE: Final = [math.nan] * 21
 NO_VARIANCE: Final = 0.01  # assumed: of an estimate that is the truth
 ESTIMATOR_AUTOPILOT: Final = 8  # MAV_ESTIMATOR_TYPE_AUTOPILOT
@@ -59,6 +61,28 @@ def scaled_pressure(sim: Simulation) -> Message:
     alt_m = _baro_alt_m(sim)
     return mav.MAVLink_scaled_pressure_message(
         codec.to_ms(sim.truth.t_s), pressure_at(alt_m), 0.0, round(_temperature_c(alt_m) * 100)
+    )
+
+
+def distance_sensor(sim: Simulation) -> Message | None:
+    """DISTANCE_SENSOR: what the LiDAR sees ahead of the nose; None before the first scan."""
+    scan = sim.scan
+    if scan is None:
+        return None
+    range_m = float(scan.range_m[round(-scan.angle_offset_rad / scan.increment_rad) % len(scan.range_m)])
+    max_cm = round(scan.range_max_m * 100)
+    return mav.MAVLink_distance_sensor_message(
+        codec.to_ms(scan.t_s),
+        round(scan.range_min_m * 100),
+        max_cm,
+        round(range_m * 100) if math.isfinite(range_m) else max_cm + 1,
+        mav.MAV_DISTANCE_SENSOR_LASER,
+        0,
+        mav.MAV_SENSOR_ROTATION_NONE,
+        UNKNOWN_VARIANCE_CM2,
+        scan.increment_rad,
+        scan.increment_rad,
+        signal_quality=GOOD_SIGNAL if math.isfinite(range_m) else INVALID_SIGNAL,
     )
 
 
@@ -152,6 +176,7 @@ BUILDERS: Final[Mapping[int, Callable[[Simulation], Message | None]]] = {
     mav.MAVLINK_MSG_ID_SCALED_IMU: scaled_imu,
     mav.MAVLINK_MSG_ID_RAW_IMU: raw_imu,
     mav.MAVLINK_MSG_ID_SCALED_PRESSURE: scaled_pressure,
+    mav.MAVLINK_MSG_ID_DISTANCE_SENSOR: distance_sensor,
     mav.MAVLINK_MSG_ID_VIBRATION: vibration,
     mav.MAVLINK_MSG_ID_ODOMETRY: odometry,
     mav.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: servo_output_raw,

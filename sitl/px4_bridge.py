@@ -22,7 +22,7 @@ from sitl.pacer import Pacer
 from sitl.px4_ear import Px4Ear
 from sitl.px4_plant import Plant
 from sitl.simulation import STEP_MS
-from sitl.truth_log import TruthFile
+from sitl.truth_log import TruthSink
 
 Message = Any  # a MAVLink_*_message object
 
@@ -56,7 +56,7 @@ class Bridge:
         links: BridgeLinks,
         speed: float,
         clock: Clock,
-        truth: TruthFile | None = None,
+        truth: TruthSink | None = None,
         say: Callable[[str], None] = lambda _text: None,
     ) -> None:
         """``speed``: vehicle seconds a wall second; inf: as fast as PX4 answers."""

@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from companion.core.types import F64, LandedState
 from sitl.modes import FlightMode
@@ -54,6 +54,16 @@ def truth_sha256(rows: Iterable[TruthRow], spawn_ned_m: F64) -> str:
     for row in rows:
         digest.update(truth_line(row, spawn_ned_m).encode() + b"\n")
     return digest.hexdigest()
+
+
+class TruthSink(Protocol):
+    """Where truth goes."""
+
+    def write(self, rows: list[TruthRow]) -> None:
+        """Take the rows out of the list."""
+
+    def flush(self) -> None:
+        """Let nothing be lost."""
 
 
 class TruthFile:

@@ -82,7 +82,7 @@ def flight(script: Script | None = None, speed: float = math.inf) -> Iterator[Fl
             ear=Px4Ear(Connection(ear, 1, 1), 1, plant.status),
         )
         truth, said = Rows(), list[str]()
-        bridge = Bridge(plant, HilSensors(3), links, speed, clock, truth, said.append)  # type: ignore[arg-type]
+        bridge = Bridge(plant, HilSensors(3), links, speed, clock, truth, said.append)
         px4 = PretendPx4(tcp.port, ear.port, script)
         yield Flight(bridge, px4, truth, companion, said)
 
