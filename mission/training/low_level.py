@@ -73,6 +73,7 @@ class SwiftNavLowLevelEnv(gymnasium.Env[F32, F32]):
         self._flight: Flight | None = None
         self._seen: Observation
         self._decisions = 0
+        self._physics_s = 0.0  # of earlier flights
         self.observation_space = spaces.Box(-np.inf, np.inf, (SIZES[self.config.observation],), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
 
@@ -83,12 +84,18 @@ class SwiftNavLowLevelEnv(gymnasium.Env[F32, F32]):
             raise RuntimeError("no flight yet: reset first")
         return self._flight
 
+    @property
+    def physics_s(self) -> float:
+        """Wall time spent in the simulator so far."""
+        return self._physics_s + (0.0 if self._flight is None else self._flight.physics_s)
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[F32, dict[str, Any]]:
         """Take off and hand over."""
         super().reset(seed=seed)
         named = (options or {}).get("world")
         source = self._source if named is None else world_source(named, self._params.vehicle.radius_m)
         world, flight_seed = source.draw(self.np_random), int(self.np_random.integers(2**31))
+        self._physics_s = self.physics_s
         flight = self._flight = Flight(flight_spec(world, flight_seed, self.config, self._params))
         self._decisions = 0
         seen = flight.take_off()

@@ -85,7 +85,7 @@ def step(state: RewardState, facts: TickFacts, table: RewardTable) -> tuple[Rewa
     rows: dict[str, float] = {}
     for name, row in ROWS.items():
         state, value = row(state, facts, table)
-        if value != 0.0:
+        if value:
             rows[name] = value
     state = replace(
         state,
@@ -130,7 +130,7 @@ def _no_progress(state: RewardState, facts: TickFacts, table: RewardTable) -> Ro
     if math.dist(facts.pos_ne_m, state.anchor_ne_m) >= NO_PROGRESS_M or facts.mode == NavMode.LANDING:
         return replace(state, anchor_t_s=facts.t_s, anchor_ne_m=facts.pos_ne_m, stuck=False), 0.0
     if facts.t_s - state.anchor_t_s < NO_PROGRESS_S - TIME_RESOLUTION_S:
-        return replace(state, stuck=False), 0.0
+        return replace(state, stuck=False) if state.stuck else state, 0.0
     return replace(state, anchor_t_s=facts.t_s, anchor_ne_m=facts.pos_ne_m, stuck=True), table.no_progress
 
 
@@ -146,7 +146,8 @@ def _departure(state: RewardState, facts: TickFacts, table: RewardTable) -> Row:
     off_m = abs(facts.cross_track_m)
     if off_m > DEPARTURE_M and not state.departed:
         return replace(state, departed=True), table.departure
-    return replace(state, departed=state.departed and off_m > DEPARTURE_M / 2), 0.0
+    back = state.departed and off_m <= DEPARTURE_M / 2
+    return replace(state, departed=False) if back else state, 0.0
 
 
 def _left_rl(state: RewardState, facts: TickFacts, table: RewardTable) -> Row:
@@ -172,10 +173,11 @@ def _travel(state: RewardState, facts: TickFacts, table: RewardTable) -> Row:
 
 
 def _zone_exit(state: RewardState, facts: TickFacts, table: RewardTable) -> Row:
-    if not facts.d_min_m > table.zone_m:
-        return replace(state, near=True), 0.0
+    inside = not facts.d_min_m > table.zone_m
+    if inside or not state.near:
+        return replace(state, near=True) if inside and not state.near else state, 0.0
     out = replace(state, near=False)
-    if not state.near or state.zone_exits >= table.zone_exit_max or not _new(facts, state.zone_exit_m, table):
+    if state.zone_exits >= table.zone_exit_max or not _new(facts, state.zone_exit_m, table):
         return out, 0.0
     nearest_m = min(state.zone_exit_m, facts.goal_distance_m)
     return replace(out, zone_exits=state.zone_exits + 1, zone_exit_m=nearest_m), table.zone_exit
