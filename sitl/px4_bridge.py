@@ -97,6 +97,9 @@ class Bridge:
         factor = self.realtime_factor
         if factor is not None:
             self._say(f"flown in lockstep with PX4 at {factor:.1f} times real time, {self.missed} steps unanswered")
+        counts = links.hil.counts
+        if counts.bad_bytes or counts.unknown:
+            self._say(f"simulator link: {counts.bad_bytes} bytes of no packet, {counts.unknown} unknown packets")
 
     def flush(self) -> None:
         """Bring the truth to the disk."""
@@ -125,9 +128,10 @@ class Bridge:
             self._take_controls()
 
     def _take_controls(self) -> None:
+        now_us = self.plant.step * STEP_MS * 1000
         for message in self._links.hil.receive():
-            if message.get_msgId() != mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
-                continue
+            if message.get_msgId() != mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS or message.time_usec > now_us:
+                continue  # no answer to any step so far
             outputs = message.controls[:MOTORS]
             self._controls = [c if math.isfinite(c) else 0.0 for c in outputs]
             self.plant.status.armed = bool(message.mode & mav.MAV_MODE_FLAG_SAFETY_ARMED)

@@ -17,6 +17,7 @@ from sitl.px4_plant import FirmwareStatus
 
 Message = Any  # a MAVLink_*_message object
 
+LANDED_STATES = frozenset(int(state) for state in LandedState)
 EAR_PORT = 13280  # px4-rc.mavlink: where PX4's gimbal link sends to; instance N adds N
 
 
@@ -39,5 +40,6 @@ class Px4Ear:
         if kind == mav.MAVLINK_MSG_ID_HEARTBEAT:
             status.mode = from_custom_mode(message.custom_mode) or status.mode
         elif kind == mav.MAVLINK_MSG_ID_AUTOPILOT_STATE_FOR_GIMBAL_DEVICE:
-            status.landed = LandedState(message.landed_state)
+            if message.landed_state in LANDED_STATES:
+                status.landed = LandedState(message.landed_state)
             status.has_flown = status.has_flown or (status.armed and status.landed is LandedState.IN_AIR)

@@ -30,6 +30,7 @@ LIVE = {
     "test_operator",
     "test_preflight_vehicle",
     "test_px4_bridge",
+    "test_px4_bridge_fuzz",
     "test_px4_suite",
     "test_reconnect",
     "test_runner",
