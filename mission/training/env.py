@@ -68,7 +68,7 @@ class SwiftNavEnv(gymnasium.Env[F32, F32]):
         self._params = navigator_params(self.config)
         self._spec = self.config.policy_spec()
         self._radius_m = self._params.vehicle.radius_m
-        self._source = world_source(world, self._radius_m)
+        self._source = self._drawn_from = world_source(world, self._radius_m)
         self._episode: Episode | None = None
         self._physics_s = 0.0  # of earlier flights
         self.observation_space = spaces.Box(-np.inf, np.inf, (SIZES[self.config.observation],), np.float32)
@@ -129,12 +129,12 @@ class SwiftNavEnv(gymnasium.Env[F32, F32]):
         return self._episode
 
     def _world(self, named: str | World | None) -> World:
-        source = self._source if named is None else world_source(named, self._radius_m)
-        return source.draw(self.np_random)
+        self._drawn_from = self._source if named is None else world_source(named, self._radius_m)
+        return self._drawn_from.draw(self.np_random)
 
     def _observed(self, query: Query) -> F32:
         return observe(self._spec.observation, query, self._flying.memory, self._params.map).astype(np.float32)
 
     def _figures(self) -> dict[str, Any]:
         episode = self._flying
-        return episode.figures() | {"path_ratio": path_ratio(episode.flight, self._source.fixed)}
+        return episode.figures() | {"path_ratio": path_ratio(episode.flight, self._drawn_from.fixed)}

@@ -171,8 +171,9 @@ class Episode:
         if in_rl:
             modes.rl_time_s += t_s - self._memory.t_s
         if engaged.arbiter.switches > modes.switches:
-            least_s = max(STABLE.dwell_s, STABLE.debounce_s)
-            modes.hasty += t_s - modes.switched_t_s < least_s - TIME_RESOLUTION_S
+            least_s = max(STABLE.dwell_s, STABLE.debounce_s) - TIME_RESOLUTION_S
+            aborted = engaged.arbiter.aborts > modes.aborts  # a landing: the one exit that need not wait
+            modes.hasty += t_s - modes.switched_t_s < least_s and not aborted
             modes.switched_t_s = t_s
         modes.switches, modes.aborts = engaged.arbiter.switches, engaged.arbiter.aborts
         self.entered = pending.query is not None and not self._asked_in_rl

@@ -23,6 +23,7 @@ from sitl.world import World
 SPLITS = ("train", "validation", "test")
 SPLIT_SIZE = 1_000_000  # indices of a split: [0, SPLIT_SIZE)
 TRIES = 50
+FEW = 10  # worlds whose shortest ways are worked out
 DENSITY_PER_M2 = (0.04, 0.15)  # trees of a forest
 SPARSE_PER_M2 = (0.03, 0.08)  # trees round a barrier
 
@@ -136,7 +137,11 @@ class FewWorlds:
     """One of these, each as often as the others."""
 
     worlds: tuple[World, ...]
-    fixed: bool = True
+
+    @property
+    def fixed(self) -> bool:
+        """See ``WorldSource``."""
+        return len(self.worlds) <= FEW
 
     def draw(self, rng: np.random.Generator) -> World:
         """Any of them."""
