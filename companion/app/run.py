@@ -21,6 +21,7 @@ from companion.core.clock import Clock, SystemClock
 from companion.core.keyring import KeyFileError
 from companion.core.transport import TransportError
 from companion.link.lidar import LidarError
+from companion.navigator.decide import policy_named
 
 DISTRIBUTIONS = ("swiftnav", "numpy", "scipy", "pymavlink")
 
@@ -48,9 +49,10 @@ def fly(
     with ExitStack() as stack:
         try:
             check(config)
+            policy_named(config.params.policy.name, config.params)  # reads the weights now, not in flight
             opened = open_all(config, clock, stack)
             logs = stack.enter_context(closing(FlightLogs(config.log_dir)))
-        except (ConfigError, KeyFileError, TransportError, LidarError, LogFolderError) as error:
+        except (ConfigError, params.ParamError, KeyFileError, TransportError, LidarError, LogFolderError) as error:
             say(str(error))
             return Summary(int(ExitCode.BAD_INPUT), str(error), 0, "", str(config.log_dir))
         if stop is None:

@@ -105,6 +105,15 @@ def check(query: CheckQuery, params: CheckerParams) -> Verdict:
     )
 
 
+def unchecked(query: CheckQuery, params: CheckerParams) -> Verdict:
+    """The proposal as it is, tested against nothing: for measuring in simulation what the checker is worth.
+
+    The margin is that of the hull alone, so the speed clamp along the path and the recheck in flight stay awake.
+    """
+    path = _path(query.start_ned_m, query.proposal_ned_m)
+    return REFUSAL if path is None else Verdict(VerdictKind.KEPT, path, 0.0, None, None, None, None)
+
+
 def recheck(path_ned_m: F64, s_m: float, points_ned_m: F64, radius_m: float) -> bool:
     """Is the rest of an accepted path still free? ``radius_m`` from ``CheckerParams.recheck_radius_m``."""
     if not math.isfinite(s_m):

@@ -1,17 +1,20 @@
 """Which polyline does RL mode fly next? When to ask the policy, what, and what the checker says; pure; local NED."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from companion.checker.checker import CheckQuery, Verdict, check, recheck, unchecked
+from companion.checker.checker import CheckQuery, Verdict, check, recheck
+from companion.checker.params import CheckerParams
 from companion.core import geometry
 from companion.core.params import ParamError, nearest
 from companion.core.task import Task
 from companion.core.types import F64, VehicleState
 from companion.guidance import follower
+from companion.navigator import guard
 from companion.navigator.memory import Engagement, Memory, Path
 from companion.navigator.params import Params
 from companion.perception.observation import observation
@@ -22,6 +25,9 @@ from companion.policy.interface import Policy, Proposal, Query
 
 ESCAPE_M = 2.0  # length of the escape segment into the widest free sector
 ESCAPE_WAYS = 16
+
+
+Judge = Callable[[CheckQuery, CheckerParams], Verdict]  # ``checker.check``; another one only to measure its worth
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +44,8 @@ class Decision:
     """One RL decision, for the record."""
 
     proposal_ne_m: F64 | None  # (k, 2)
-    verdict: Verdict | None  # None: the policy had no proposal
+    verdict: Verdict
+    guarded: bool  # the expert's path was judged, and flown, instead
 
 
 def due(engaged: Engagement, state: VehicleState, percept: Percept, task: Task, params: Params) -> bool:
@@ -46,7 +53,7 @@ def due(engaged: Engagement, state: VehicleState, percept: Percept, task: Task, 
     if state.t_s - engaged.tried_t_s < params.policy.retry_s - 1e-6:
         return False
     path = engaged.path
-    if path is None or state.t_s - path.decided_t_s >= params.policy.path_lasts_s() - 1e-6:
+    if path is None or state.t_s - path.decided_t_s >= path.lasts_s - 1e-6:
         return True
     end = path.vertices_ne_m[-1]
     left_m = geometry.length(path.vertices_ne_m) - path.s_m
@@ -77,30 +84,36 @@ def ask(query: Query, memory: F64 | None, params: Params) -> Answer:
 
 
 def settle(
-    memory: Memory, engaged: Engagement, query: Query, answer: Answer, percept: Percept, params: Params
+    memory: Memory, engaged: Engagement, query: Query, answer: Answer, percept: Percept, params: Params, judge: Judge
 ) -> tuple[Memory, Engagement, Decision]:
     """Let the checker judge the answer; the accepted path, or None (brake and hold), goes into the engagement."""
-    state = query.state
-    memory = replace(memory, policy=answer.memory, decisions=memory.decisions + 1)
-    waypoints = None if answer.proposal is None else answer.proposal.waypoints_ne_m
+    state, proposal = query.state, answer.proposal
     asked = CheckQuery(
         start_ned_m=query.prefix_ne_m[0],
         start_vel_ned_m_s=state.vel_ned_m_s[:2],
         goal_ned_m=query.goal_ne_m,
         radius_m=query.radius_m,
         points_ned_m=percept.points_ne_m,
-        proposal_ned_m=waypoints,
+        proposal_ned_m=None if proposal is None else proposal.waypoints_ne_m,
         escape_ned_m=None,
-        others_ned_m=() if answer.proposal is None else answer.proposal.others_ne_m,
+        others_ned_m=() if proposal is None else proposal.others_ne_m,
     )
-    verdict = check(asked, params.checker) if answer.checked else unchecked(asked)
-    if verdict.path_ned_m is None and answer.checked:
+    verdict, guarded, way = judge(asked, params.checker), False, memory.guard
+    if params.policy.guard and params.policy.name != GeometricExpert.name:
+        expert, way = _expert(params.expert, params).propose(query, memory.guard)
+        theirs = replace(asked, proposal_ned_m=None if expert is None else expert.waypoints_ne_m, others_ned_m=())
+        theirs_verdict = check(theirs, params.checker)
+        guarded = guard.steps_in(verdict, theirs_verdict, way, asked, params.policy.guard_ratio)
+        verdict = theirs_verdict if guarded else verdict
+    if verdict.path_ned_m is None:
         escape = _escape(state.pos_ned_m[:2], query.goal_ne_m, percept, params)
         verdict = check(replace(asked, proposal_ned_m=None, others_ned_m=(), escape_ned_m=escape), params.checker)
     path = None
     if verdict.path_ned_m is not None and verdict.margin_m is not None:
-        path = Path(verdict.path_ned_m, 0.0, verdict.margin_m, state.t_s)
-    return memory, replace(engaged, path=path, tried_t_s=state.t_s), Decision(waypoints, verdict)
+        lasts_s = params.policy.horizon_s if guarded else params.policy.path_lasts_s()
+        path = Path(verdict.path_ned_m, 0.0, verdict.margin_m, state.t_s, lasts_s)
+    memory = replace(memory, policy=answer.memory, guard=way, decisions=memory.decisions + 1)
+    return memory, replace(engaged, path=path, tried_t_s=state.t_s), Decision(asked.proposal_ned_m, verdict, guarded)
 
 
 def policy_named(name: str, params: Params) -> Policy:

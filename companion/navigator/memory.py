@@ -21,6 +21,7 @@ class Path:
     s_m: float
     margin_m: float  # beyond the radius, at which it passed
     decided_t_s: float
+    lasts_s: float  # then it is planned anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +50,7 @@ class Memory:
     t_s: float
     yaw_sp_rad: float
     policy: F64 | None  # whatever the policy wants to see again
+    guard: F64 | None  # the same of the geometric expert, where it guards another policy
     decisions: int
     state: VehicleState | None  # the last one that could be believed
     ground_down_m: float  # where the autopilot last stood, by its own estimate
@@ -57,4 +59,4 @@ class Memory:
 
 def start(params: Params) -> Memory:
     """Nothing seen, nobody flies."""
-    return Memory(gridmap.empty(params.map), (), 0, 0.0, 0.0, None, 0, None, 0.0, None)
+    return Memory(gridmap.empty(params.map), (), 0, 0.0, 0.0, None, None, 0, None, 0.0, None)

@@ -9,7 +9,7 @@ from companion.arbiter.facts import Facts, Thresholds, landing_safe
 from companion.core.task import Task
 from companion.core.types import NavMode, Setpoint, VehicleState
 from companion.guidance import landing, limits, line
-from companion.navigator.decide import Answer, Decision, settle
+from companion.navigator.decide import Answer, Decision, Judge, settle
 from companion.navigator.memory import Engagement, Memory
 from companion.navigator.params import Params
 from companion.navigator.track import Route, Tracked, course_along, track, turned
@@ -43,8 +43,17 @@ class Steered:
     touchdown: bool = False
 
 
-def steer(memory: Memory, engaged: Engagement, scene: Scene, asked: tuple[Query, Answer] | None) -> Steered:
-    """The setpoint of the mode; braking and holding come first. ``asked``: what the policy said, where it was due."""
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What the policy said, and who judges it."""
+
+    query: Query
+    answer: Answer
+    judge: Judge
+
+
+def steer(memory: Memory, engaged: Engagement, scene: Scene, asked: Asked | None) -> Steered:
+    """The setpoint of the mode; braking and holding come first. ``asked``: where a decision was due."""
     if engaged.arbiter.hold:
         return _held(memory, engaged, scene)
     if engaged.arbiter.mode == NavMode.LANDING:
@@ -74,11 +83,13 @@ def _travel(memory: Memory, engaged: Engagement, scene: Scene) -> Steered:
     return Steered(memory, engaged, tracked.setpoint, tracked)
 
 
-def _follow(memory: Memory, engaged: Engagement, scene: Scene, asked: tuple[Query, Answer] | None) -> Steered:
+def _follow(memory: Memory, engaged: Engagement, scene: Scene, asked: Asked | None) -> Steered:
     """Along the accepted polyline; no path: brake and hold, then ask again."""
     decision = None
     if asked is not None:
-        memory, engaged, decision = settle(memory, engaged, *asked, scene.percept, scene.params)
+        memory, engaged, decision = settle(
+            memory, engaged, asked.query, asked.answer, scene.percept, scene.params, asked.judge
+        )
     path, params = engaged.path, scene.params
     if path is None or _must_stop(scene):
         held = _held(memory, replace(engaged, path=None), scene)

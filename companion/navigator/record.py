@@ -88,11 +88,13 @@ def _decided(decision: Decision) -> dict[str, Any]:
     verdict = decision.verdict
     return {
         "proposal_ne_m": _rows(decision.proposal_ne_m),
-        "verdict": str(verdict.kind) if verdict else None,
-        "path_ne_m": _rows(verdict.path_ned_m) if verdict else None,
-        "margin_m": verdict.margin_m if verdict else None,
-        "clearance_m": _number(verdict.clearance_m) if verdict else None,
-        "score": _number(verdict.score) if verdict else None,
+        "guarded": decision.guarded,
+        "verdict": str(verdict.kind),
+        "choice": verdict.choice,
+        "path_ne_m": _rows(verdict.path_ned_m),
+        "margin_m": verdict.margin_m,
+        "clearance_m": _number(verdict.clearance_m),
+        "score": _number(verdict.score),
     }
 
 

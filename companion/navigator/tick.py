@@ -11,6 +11,7 @@ import numpy as np
 
 from companion.arbiter import arbiter
 from companion.arbiter.facts import Facts, Thresholds, thresholds
+from companion.checker.checker import check
 from companion.core import gridmap
 from companion.core.frames import yaw_rad
 from companion.core.inputs import Inputs
@@ -18,9 +19,9 @@ from companion.core.task import Task
 from companion.core.types import AutopilotStatus, LandedState, NavMode, Setpoint, VehicleState
 from companion.guidance import landing, line
 from companion.navigator.believe import believable, stand_in
-from companion.navigator.decide import Answer, ask, due, question
+from companion.navigator.decide import Answer, Judge, ask, due, question
 from companion.navigator.memory import Engagement, Memory
-from companion.navigator.modes import Scene, steer
+from companion.navigator.modes import Asked, Scene, steer
 from companion.navigator.params import Params
 from companion.navigator.record import Record
 from companion.perception.perceive import Percept, Remembered, perceive
@@ -94,8 +95,11 @@ def sense(memory: Memory, inputs: Inputs, task: Task, params: Params) -> Pending
     return Pending(query, memory, inputs, percept, goal_m, engaged, scene)
 
 
-def act(pending: Pending, answer: Answer | None) -> tuple[Memory, Setpoint, Record]:
-    """The second half: ``answer`` to ``pending.query`` (None exactly where that is None), checked and flown."""
+def act(pending: Pending, answer: Answer | None, judge: Judge = check) -> tuple[Memory, Setpoint, Record]:
+    """The second half: ``answer`` to ``pending.query`` (None exactly where that is None), checked and flown.
+
+    ``judge`` is the checker; only a measurement of what the checker is worth names another one.
+    """
     if (answer is None) != (pending.query is None):
         raise ValueError("an answer is needed exactly where a query was put")
     memory, inputs, percept, engaged, scene = (
@@ -104,7 +108,7 @@ def act(pending: Pending, answer: Answer | None) -> tuple[Memory, Setpoint, Reco
     if engaged is None or scene is None:
         memory, setpoint = _standby(memory, inputs.state)
         return memory, setpoint, Record(inputs, percept, memory, setpoint, pending.goal_m)
-    asked = None if pending.query is None or answer is None else (pending.query, answer)
+    asked = None if pending.query is None or answer is None else Asked(pending.query, answer, judge)
     steered = steer(memory, engaged, scene, asked)
     yaw_sp = memory.yaw_sp_rad if steered.setpoint.yaw_rad is None else steered.setpoint.yaw_rad
     memory = replace(steered.memory, engaged=steered.engaged, yaw_sp_rad=yaw_sp)
