@@ -2,8 +2,8 @@
 
 ``clock_s``: a *step* of a table is this long, so that the tick rate is no hyper-parameter. The paper's 50 steps are
 5 s here. ``scale`` brings sums of rows to what a critic learns well; rows are reported in the table's own units.
-Contact ends every episode: the vehicle would fly through what it touches, so there is no recovering from it; the paper's
-recoverable collision is paid as printed in the ``_paper`` table.
+Contact ends every episode: the vehicle would fly through what it touches, so there is no recovering from it; the
+paper's recoverable collision is paid as printed in the ``_paper`` table.
 
 As printed both tables can be farmed: a bypass pays for 10 s of flight, endpoints and zone exits pay without ever
 reaching the goal. The ``default`` variants pay leaving RL mode, and zones, only for ``new_progress_m`` beyond any exit
