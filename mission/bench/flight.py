@@ -20,7 +20,7 @@ from companion.core.task import Task
 from companion.core.types import F64, Setpoint
 from mission.bench.course import Course
 from mission.bench.stress import NONE, Stress
-from mission.pilots.interface import Pilot, PilotNote
+from mission.pilots.interface import Oracle, Pilot, PilotNote
 from sitl.lidar import LidarParams
 from sitl.modes import FlightMode
 from sitl.simulation import Observation, SimConfig, Simulation
@@ -90,6 +90,8 @@ def fly(
     _take_off(sim)
     offset = course.sent_to_ned_m - spawn
     task = Task(np.round(offset, 6), -course.rules.altitude_m, course.rules.speed_m_s)
+    if isinstance(pilot, Oracle):
+        pilot = pilot.told(course.world, spawn)
     memory = pilot.start(params)
     if back_m:
         seen = _run_up(sim, back_m, course.rules)

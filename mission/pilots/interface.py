@@ -6,12 +6,13 @@ False it may look round, but what it answers is not flown.
 """
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from companion import navigator
 from companion.core.inputs import Inputs
 from companion.core.task import Task
 from companion.core.types import F64, Setpoint
+from sitl.world import World
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,4 +41,13 @@ class Pilot(Protocol):
         self, memory: Any, inputs: Inputs, task: Task, params: navigator.Params
     ) -> tuple[Any, Setpoint, PilotNote]:
         """One scan in, one setpoint out; local ned. Nothing but the arguments may matter."""
+        ...
+
+
+@runtime_checkable
+class Oracle(Protocol):
+    """A pilot that knows more than it sees."""
+
+    def told(self, world: World, spawn_ned_m: F64) -> Pilot:
+        """The pilot for one flight: what stands where in world ned, and where local ned has its origin."""
         ...

@@ -9,6 +9,11 @@ from mission.pilots.interface import Pilot
 
 # Name, then module and factory: a pilot is imported when it is asked for.
 PILOTS: dict[str, tuple[str, str]] = {
+    "brake": ("mission.pilots.brake", "Brake"),
+    "dwa": ("mission.pilots.dwa", "Dwa"),
+    "vfh": ("mission.pilots.vfh", "Vfh"),
+    "astar": ("mission.pilots.astar", "Astar"),
+    "ompl": ("mission.pilots.ompl", "Ompl"),
     "geometric": ("mission.pilots.swiftnav", "SwiftNav"),
 }
 
