@@ -22,6 +22,7 @@ LIVE = {
     "test_companion_app_process",
     "test_companion_serial",
     "test_disturbed",
+    "test_fleet",
     "test_lidar",
     "test_mavproxy",
     "test_mavproxy_talk",
