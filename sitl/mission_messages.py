@@ -14,6 +14,12 @@ _COUNT: Final = struct.Struct("<HBBBI")
 _ACK: Final = struct.Struct("<BBBBI")
 _CURRENT: Final = struct.Struct("<HHBBIII")
 NO_ITEMS: Final = 65535  # MISSION_CURRENT.total of an empty mission
+# PX4 names a mission's frames anew when it sends them: scaled ones in MISSION_ITEM_INT, the others in MISSION_ITEM.
+_SCALED: Final = {
+    mav.MAV_FRAME_GLOBAL: mav.MAV_FRAME_GLOBAL_INT,
+    mav.MAV_FRAME_GLOBAL_RELATIVE_ALT: mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+}
+_PLAIN: Final = {scaled: plain for plain, scaled in _SCALED.items()}
 
 
 def count(target: tuple[int, int], number: int, kind: int, opaque_id: int) -> Message:
@@ -45,7 +51,8 @@ def reached(seq: int) -> Message:
 
 def item(target: tuple[int, int], seq: int, entry: MissionItem, kind: int, is_current: bool, whole: bool) -> Message:
     """MISSION_ITEM_INT, or MISSION_ITEM for a client that asked with MISSION_REQUEST (``whole`` False)."""
-    head = (*target, seq, entry.frame, entry.command, int(is_current), int(entry.autocontinue), *entry.params)
+    frame = (_SCALED if whole else _PLAIN).get(entry.frame, entry.frame)
+    head = (*target, seq, frame, entry.command, int(is_current), int(entry.autocontinue), *entry.params)
     if whole:
         return mav.MAVLink_mission_item_int_message(*head, entry.x, entry.y, entry.z, kind)
     scale = 1.0 if entry.frame == mav.MAV_FRAME_MISSION else 1e-7

@@ -91,6 +91,7 @@ def test_a_mission_goes_up_and_comes_down(talker: Client, whole: bool) -> None:
         back = talker.message("MISSION_ITEM_INT" if whole else "MISSION_ITEM")
         scale = 1.0 if whole else 1e7
         assert (back.seq, back.command, back.z) == (seq, item.command, item.z)
+        assert back.frame == (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT if whole else FRAME)
         # single floats: the older message knows a place to a few decimetres only
         assert (back.x * scale, back.y * scale) == pytest.approx((item.x, item.y), abs=1.0 if whole else 40.0)
     talker.send(mav.MAVLink_mission_ack_message(1, 1, 0, 0))  # MAVProxy leaves it out and waits for PX4 to give up
