@@ -108,10 +108,10 @@ def check(query: CheckQuery, params: CheckerParams) -> Verdict:
 def unchecked(query: CheckQuery, params: CheckerParams) -> Verdict:
     """The proposal as it is, tested against nothing: for measuring in simulation what the checker is worth.
 
-    The margin is that of the hull alone, so the speed clamp along the path and the recheck in flight stay awake.
+    It counts as passed at the full margin, so that speed clamp and recheck in flight are those of any other path.
     """
     path = _path(query.start_ned_m, query.proposal_ned_m)
-    return REFUSAL if path is None else Verdict(VerdictKind.KEPT, path, 0.0, None, None, None, None)
+    return REFUSAL if path is None else Verdict(VerdictKind.KEPT, path, params.margins_m()[0], None, None, None, None)
 
 
 def recheck(path_ned_m: F64, s_m: float, points_ned_m: F64, radius_m: float) -> bool:
