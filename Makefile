@@ -37,13 +37,16 @@ $(BIN)/python:
 	fi; \
 	"$$python" -m venv $(VENV)
 
-# `fly` needs the companion and the vehicle; `dev` adds the test tools. Neither needs torch.
+# `fly` needs the companion and the vehicle, no torch; `dev` adds what trains and the test tools; `scale` adds Ray.
 $(VENV)/.sitl: $(BIN)/python pyproject.toml constraints.txt
 	$(BIN)/pip install -q -c constraints.txt -e '.[sitl]'
 	@touch $@
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
 	$(BIN)/pip install -q -c constraints.txt -e '.[dev]'
 	@touch $@ $(VENV)/.sitl
+$(VENV)/.scale: $(VENV)/.dev
+	$(BIN)/pip install -q -c constraints.txt -e '.[dev,scale]'
+	@touch $@
 
 setup: $(VENV)/.dev
 
@@ -64,7 +67,7 @@ test: check
 	$(BIN)/pytest -n 2 -m "not slow and not live"
 	$(BIN)/pytest -m "live and not slow" --reruns 3 --reruns-delay 1
 
-slow: $(VENV)/.dev
+slow: $(VENV)/.scale
 	$(BIN)/pytest -m slow --timeout 3600
 
 tables: $(VENV)/.sitl
