@@ -10,9 +10,11 @@ import typer
 
 from companion.core.params import ParamError
 from mission.cli_bench import app as bench_app
+from mission.cli_eval import evaluate, export
 from mission.cli_fly import fly
 from mission.cli_params import app as params_app
 from mission.cli_sitl import sitl
+from mission.cli_train import train
 from mission.cli_worlds import app as worlds_app
 from mission.errors import FlightError, InputError
 
@@ -30,6 +32,9 @@ app = typer.Typer(
 )
 app.command(epilog="Example: swiftnav fly trajectory2 --seed 7 --json")(fly)
 app.command(epilog="Example: swiftnav sitl --world trajectory1 --speed 1")(sitl)
+app.command(epilog="Example: swiftnav train --world trajectory1 --seeds 5 --until-successes 100")(train)
+app.command("eval", epilog="Example: swiftnav eval geometric --world barrier --episodes 60 --json")(evaluate)
+app.command(epilog="Example: swiftnav export trajectory2 --onnx trajectory2.onnx")(export)
 app.add_typer(worlds_app, name="worlds")
 app.add_typer(params_app, name="params")
 app.add_typer(bench_app, name="bench")

@@ -76,14 +76,14 @@ def export(
 ) -> None:
     """Write a policy's actor as ONNX, and compare what the file computes with what flies."""
     require_extra("train", "export")
+    from companion.policy.store import folder_of
     from mission.training.export import export_onnx
 
-    facts = export_onnx(policy, onnx)
+    difference = export_onnx(folder_of(policy), onnx)
     if json:
-        print_json(facts)
+        print_json({"policy": policy, "file": str(onnx), "largest_difference": difference})
         return
-    for key, value in facts.items():
-        typer.echo(f"{key:20} {value}")
+    typer.echo(f"{onnx}: at most {difference:.1e} away from what flies")
 
 
 def _shown(flights: Any, count: int, title: str, quiet: bool) -> "list[FlightFigures]":

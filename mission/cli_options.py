@@ -15,7 +15,11 @@ if TYPE_CHECKING:
     from mission.px4_firmware import Px4Build
     from sitl.vehicle_config import Firmware
 
-EXTRA_MODULES = {"sitl": ("jsbsim", "mavsdk", "numba", "fcl", "matplotlib")}  # as pyproject.toml lists them
+EXTRA_MODULES = {  # as pyproject.toml lists them
+    "sitl": ("jsbsim", "mavsdk", "numba", "fcl", "matplotlib"),
+    "train": ("jsbsim", "matplotlib", "torch", "gymnasium", "tensorboard", "onnx"),
+    "scale": ("ray",),
+}
 SPEED_MIN, SPEED_MAX = 0.1, 100.0
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines.")]
