@@ -1,7 +1,8 @@
-"""``swiftnav bench``: how quick is it on this machine?"""
+"""``swiftnav bench``: how quick is it on this machine, and how does it fly where others are measured?"""
 
 import typer
 
+from mission.cli_bench_suites import register
 from mission.cli_options import Json, Seed, print_json, require_extra
 
 app = typer.Typer(help="Measurements.")
@@ -25,3 +26,6 @@ def speed(seed: Seed = 1, json: Json = False) -> None:
     for name, value in figures.items():
         figure = f"{value:.3g}" if isinstance(value, float) else value
         typer.echo(f"{name:17} {figure:>8}  {FIGURES[name]}")
+
+
+register(app)

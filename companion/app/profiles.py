@@ -1,0 +1,25 @@
+"""Which named parameter sets come with the companion? ``companion/profiles/*.yaml``: {group: {field: value}} each."""
+
+from importlib import resources
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from companion.core.params import ParamError, nearest
+
+FOLDER = "profiles"
+
+
+def profile_names() -> list[str]:
+    """Every name that ``profile_named`` knows."""
+    files = (resources.files("companion") / FOLDER).iterdir()
+    return sorted(item.name.removesuffix(".yaml") for item in files if item.name.endswith(".yaml"))
+
+
+def profile_named(name: str) -> dict[str, dict[str, Any]]:
+    """Overrides of the defaults. Raises ParamError with the nearest name."""
+    if name not in profile_names():
+        raise ParamError(f"unknown profile '{name}'{nearest(name, profile_names())}")
+    text = (resources.files("companion") / FOLDER / f"{name}.yaml").read_text(encoding="utf-8")
+    overrides: dict[str, dict[str, Any]] = YAML(typ="safe").load(text) or {}
+    return overrides

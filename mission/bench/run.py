@@ -1,0 +1,163 @@
+"""How are the runs of a suite flown: which are missing, by how many processes, and where do the rows go?
+
+``OUT/SUITE/ENTRY/`` holds ``runs.csv`` (one row a run, appended as it ends), ``setup.json`` (what was flown, so that
+runs of other settings are never mixed in) and ``failures/``. Interrupt at any time: what is there is not flown again.
+"""
+
+import dataclasses
+import json
+import multiprocessing
+import platform
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from mission.bench import rows
+from mission.bench.entry import Entry, fly_run
+from mission.bench.rows import Row
+from mission.bench.suites import Suite, suite_named
+from mission.errors import InputError
+
+RUNS, SETUP, FAILURES = "runs.csv", "setup.json", "failures"
+
+
+@dataclass(frozen=True, slots=True)
+class SuiteSpec:
+    """Which suite, as a person names it."""
+
+    name: str
+    folder: Path | None = None
+    part: str = "all"
+
+    def load(self) -> Suite:
+        """Raises InputError."""
+        return suite_named(self.name, self.folder, self.part)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One run still to be flown."""
+
+    cell: int
+    run: int
+
+
+def entry_folder(out: Path, spec: SuiteSpec, entry: Entry) -> Path:
+    """Where the runs of an entry lie."""
+    suite = spec.name if spec.part == "all" else f"{spec.name}_{spec.part}"
+    parts = [entry.pilot]
+    parts += [entry.profile] if entry.profile is not None else []
+    parts += [entry.stress] if entry.stress != "none" else []
+    parts += ["stiff"] if entry.px4_params else []
+    return out / suite / "_".join(parts)
+
+
+def missing(suite: Suite, runs: int | None, there: list[Row]) -> list[Job]:
+    """Runs of each cell that are not there yet, the first runs of every cell first."""
+    flown = {(row.cell, row.run) for row in there}
+    count = suite.runs if runs is None else runs
+    return [
+        Job(index, run)
+        for run in range(count)
+        for index, cell in enumerate(suite.cells)
+        if (cell.name, run) not in flown
+    ]
+
+
+def fly_missing(
+    spec: SuiteSpec, suite: Suite, entry: Entry, folder: Path, runs: int | None = None, jobs: int = 1
+) -> Iterator[Row]:
+    """Fly what is missing, append each row as it ends and hand it over. Raises InputError for other settings there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    _claim(folder / SETUP, spec, entry)
+    todo = missing(suite, runs, rows.read(folder / RUNS))
+    entry = dataclasses.replace(entry, pictures=folder / FAILURES)
+    for row in _flown(suite, entry, todo, jobs):
+        rows.append(folder / RUNS, row)
+        yield row
+
+
+def read_entry(folder: Path) -> list[Row]:
+    """Everything that was flown into this folder."""
+    return rows.read(folder / RUNS)
+
+
+def read_rows(folder: Path, suite: Suite, runs: int | None = None) -> list[Row]:
+    """What was flown of the suite's cells, by run, at most that many of each cell."""
+    most = suite.runs if runs is None else runs
+    names = [cell.name for cell in suite.cells]
+    found = [row for row in rows.read(folder / RUNS) if row.cell in names and row.run < most]
+    return sorted(found, key=lambda row: (names.index(row.cell), row.run))
+
+
+def machine() -> str:
+    """Where this runs."""
+    return f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
+
+
+def commit() -> str:
+    """Of the checkout that this runs from, '+' when it was changed since; 'unknown' outside of one."""
+    here = Path(__file__).parent
+    try:
+        found = subprocess.run(
+            ["git", "describe", "--always", "--dirty=+", "--exclude=*"],
+            cwd=here,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return found.stdout.strip()
+
+
+def _claim(path: Path, spec: SuiteSpec, entry: Entry) -> None:
+    """Write down what is flown here; what lies here already must be the same."""
+    settings: dict[str, Any] = {"suite": spec.name, "part": spec.part, **entry.settings()}
+    if path.is_file():
+        there = json.loads(path.read_text(encoding="utf-8"))
+        for key, value in settings.items():
+            if there.get(key) != value:
+                raise InputError(
+                    f"{path.parent} holds runs with {key} {json.dumps(there.get(key))}, asked for is"
+                    f" {json.dumps(value)}: choose another --out, or remove it"
+                )
+        return
+    stamp = datetime.now(UTC).strftime("%Y-%m-%d")
+    text = json.dumps({**settings, "date": stamp, "commit": commit(), "machine": machine()}, indent=1)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def _flown(suite: Suite, entry: Entry, todo: list[Job], jobs: int) -> Iterator[Row]:
+    state = commit()
+    if jobs == 1 or len(todo) <= 1:
+        for job in todo:
+            yield fly_run(suite.cells[job.cell].course(job.run), job.run, entry, state)
+        return
+    arguments = (suite, entry, state)
+    with multiprocessing.get_context("spawn").Pool(min(jobs, len(todo)), _set_up, arguments) as pool:
+        yield from pool.imap_unordered(_fly, todo)
+
+
+@dataclass(slots=True)
+class _Process:
+    """What one process of the pool keeps."""
+
+    suite: Suite
+    entry: Entry
+    commit: str
+
+
+_process: list[_Process] = []  # filled once, in a process of the pool only
+
+
+def _set_up(suite: Suite, entry: Entry, state: str) -> None:
+    _process.append(_Process(suite, entry, state))
+
+
+def _fly(job: Job) -> Row:
+    kept = _process[0]
+    return fly_run(kept.suite.cells[job.cell].course(job.run), job.run, kept.entry, kept.commit)
