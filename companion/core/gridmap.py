@@ -19,7 +19,7 @@ from companion.core.types import F64
 F32 = NDArray[np.float32]
 Index = NDArray[np.intp]
 
-AZIMUTH_BINS = 360  # 1 deg: 21 cm at 12 m, a cell
+AZIMUTH_BINS = 360  # 1 deg: 24 cm at 14 m, about a cell
 SUBCELLS = 4  # range and azimuth tables exist for 4 x 4 positions of the vehicle inside its cell
 NEVER = np.float32(0.0)  # stamps are vehicle time, which is positive
 # Inner edges of the rings of cells that share one angular erosion.
@@ -35,8 +35,8 @@ class MapParams:
     """Size and memory of the rolling map."""
 
     cell_m: float = param(0.2, "SN_MAP_CELL", "Edge of a cell", "m", 0.05, 0.5)
-    cells: int = param(128, "SN_MAP_CELLS", "Cells along one side of the map", "", 40, 400)
-    sense_m: float = param(12.0, "SN_MAP_SENSE", "Ranges beyond this are not entered", "m", 3.0, 40.0)
+    cells: int = param(144, "SN_MAP_CELLS", "Cells along one side of the map", "", 40, 400)
+    sense_m: float = param(14.0, "SN_MAP_SENSE", "Ranges beyond this are not entered", "m", 3.0, 40.0)
     certified_s: float = param(
         5.0, "SN_MAP_CERT_T", "A hit may not occupy a cell certified free this lately", "s", 0, 60
     )
