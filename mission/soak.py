@@ -8,6 +8,7 @@ lockstep; without companions there are no answers to wait for, and time runs as 
 import argparse
 import json
 import math
+import os
 import sys
 import tempfile
 import threading
@@ -45,7 +46,7 @@ START_S: Final = 60.0  # that all have to be heard
 FACTOR_MIN: Final = 0.99  # of the speed asked for
 EXIT_HELD, EXIT_MISSED, EXIT_BAD_INPUT = 0, 1, 2
 HEADER_BYTES: Final = 10  # MAVLink 2
-CHILDREN: Final = {"from multiprocessing.spawn": "vehicle", "-m sitl": "vehicle", "-m companion": "companion"}
+KINDS: Final = {"spawn_main": "vehicle", "-m companion": "companion", "resource_tracker": "tracker"}
 
 
 class Ear:
@@ -102,7 +103,7 @@ def soak(given: argparse.Namespace, folder: Path) -> dict[str, Any]:
         stack.callback(stop.set)
         fliers = [Flier(member, children, folder, stop) for member in members] if given.fly else []
         flying = [pool.submit(flier.fly) for flier in fliers]
-        memories = _watch(given.minutes * 60.0, ears, fleet.process.pid, flying, lambda: fleet.exit_code is None)
+        memories = _watch(given.minutes * 60.0, ears, flying, lambda: fleet.exit_code is None)
         stop.set()
         legs = sum(future.result() for future in flying)
     rates = LEAN_HZ if lockstep else ONBOARD_HZ
@@ -111,9 +112,7 @@ def soak(given: argparse.Namespace, folder: Path) -> dict[str, Any]:
     return {**_asked(given), "legs": legs, **figures}
 
 
-def _watch(
-    wall_s: float, ears: list[Ear], parent: int, flying: list[Future[int]], alive: Callable[[], bool]
-) -> list[Memory]:
+def _watch(wall_s: float, ears: list[Ear], flying: list[Future[int]], alive: Callable[[], bool]) -> list[Memory]:
     """Listen and sample for ``wall_s`` after everybody was heard."""
     memories: dict[int, Memory] = {}
     began_s, heard_s = time.monotonic(), math.inf
@@ -142,13 +141,16 @@ def _watch(
                     ear.traffic.clock.append((now_s - began_s, ear.vehicle_s))
         if warm and now_s - sample_s >= SAMPLE_S:
             sample_s = now_s
-            _sample(memories, parent, now_s - began_s)
+            _sample(memories, now_s - began_s, alone=len(ears) == 1)
     return list(memories.values())
 
 
-def _sample(memories: dict[int, Memory], fleet: int, at_s: float) -> None:
-    for pid, (size_mb, command) in resident_mb(fleet).items():
-        kind = next((name for words, name in CHILDREN.items() if words in command), "hub")
+def _sample(memories: dict[int, Memory], at_s: float, alone: bool) -> None:
+    """Every child but the ``ps`` that tells of them; ``alone``: a single vehicle needs no hub."""
+    for pid, (size_mb, command) in resident_mb(os.getpid()).items():
+        if pid == os.getpid() or command.startswith("ps "):
+            continue
+        kind = next((name for words, name in KINDS.items() if words in command), "vehicle" if alone else "hub")
         memories.setdefault(pid, Memory(f"{kind} {pid}")).samples.append((at_s, size_mb))
 
 

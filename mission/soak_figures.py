@@ -67,7 +67,10 @@ def summary(memories: Iterable[Memory], traffics: Sequence[Traffic], asked_hz: M
     factors = [factor for traffic in traffics if (factor := traffic.realtime_factor()) is not None]
     streams = [_stream(message_id, traffics, asked_hz[message_id]) for message_id in sorted(asked_hz)]
     heard = [stream for stream in streams if stream is not None]
-    processes = [_process(memory) for memory in memories if memory.samples]
+    lives = [memory for memory in memories if memory.samples]
+    longest = max((len(memory.samples) for memory in lives), default=0)
+    processes = [_process(memory) for memory in lives if len(memory.samples) > longest // 2]
+    short = [max(mb for _, mb in memory.samples) for memory in lives if len(memory.samples) <= longest // 2]
     grown = [row["growth_mb"] for row in processes if row["growth_mb"] is not None]
     return {
         "realtime_factor": min(factors, default=None),
@@ -75,6 +78,8 @@ def summary(memories: Iterable[Memory], traffics: Sequence[Traffic], asked_hz: M
         "rate_drift_max": max((abs(row["drift"]) for row in heard), default=None),
         "growth_mb_max": max(grown, default=None),
         "processes": processes,
+        "short_lives": len(short),  # companions of legs flown: too short to tell growth
+        "short_lives_peak_mb": max(short, default=None),
         "streams": heard,
     }
 
@@ -82,10 +87,11 @@ def summary(memories: Iterable[Memory], traffics: Sequence[Traffic], asked_hz: M
 def resident_mb(parent: int) -> dict[int, tuple[float, str]]:
     """Memory and command line of a process and all that it has started."""
     told = subprocess.run(["ps", "-axo", "pid=,ppid=,rss=,args="], capture_output=True, text=True, check=True).stdout
-    return _family(told, parent)
+    return family_of(told, parent)
 
 
-def _family(told: str, parent: int) -> dict[int, tuple[float, str]]:
+def family_of(told: str, parent: int) -> dict[int, tuple[float, str]]:
+    """The same from what ``ps`` has told."""
     rows = [line.split(maxsplit=3) for line in told.splitlines()]
     known = {int(row[0]): row for row in rows if len(row) == 4}
     family = {parent} & known.keys()
