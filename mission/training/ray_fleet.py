@@ -6,6 +6,7 @@ ran; a task that is lost is reported like a process that died. Ray is imported o
 """
 
 import contextlib
+import socket
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -23,6 +24,7 @@ from mission.training.status import Status
 
 LOCAL = "local"  # ``--cluster local``: a Ray of its own on this machine
 POLL_S = 0.5
+KNOCK_S = 5.0
 
 Files = dict[str, bytes]  # by path below the seed's folder
 News = Status | Files | str  # how it stands, what lies there, what went wrong
@@ -70,6 +72,7 @@ def write_files(folder: Path, files: Files) -> None:
 
 
 def _connect(address: str, jobs: int) -> None:
+    _reach(address)
     try:
         if address == LOCAL:
             ray.init(num_cpus=jobs, include_dashboard=False, log_to_driver=False)
@@ -77,6 +80,17 @@ def _connect(address: str, jobs: int) -> None:
             ray.init(address=address, log_to_driver=False)
     except (ConnectionError, ValueError, RuntimeError) as error:
         raise InputError(f"--cluster '{address}': {error}") from error
+
+
+def _reach(address: str) -> None:
+    """Ray itself tries for minutes. ``HOST:PORT`` and ``ray://HOST:PORT`` are knocked at."""
+    host, separator, port = address.removeprefix("ray://").rpartition(":")
+    if not separator:
+        return
+    try:
+        socket.create_connection((host, int(port)), KNOCK_S).close()
+    except (OSError, ValueError, OverflowError) as error:
+        raise InputError(f"--cluster '{address}': nobody answers there ({error})") from error
 
 
 def _train(job: Job, seed: int, files: Files) -> Iterator[News]:
