@@ -58,7 +58,7 @@ def due(engaged: Engagement, state: VehicleState, percept: Percept, task: Task, 
     end = path.vertices_ne_m[-1]
     left_m = geometry.length(path.vertices_ne_m) - path.s_m
     to_goal = math.hypot(end[0] - task.goal_ned_m[0], end[1] - task.goal_ned_m[1])
-    used_up = left_m < params.policy.used_up_m and to_goal > params.policy.used_up_m
+    used_up = left_m < path.used_up_m and to_goal > path.used_up_m
     radius_m = params.checker.recheck_radius_m(params.vehicle.radius_m, path.margin_m)
     return used_up or not recheck(path.vertices_ne_m, path.s_m, percept.points_ne_m, radius_m)
 
@@ -110,8 +110,7 @@ def settle(
         verdict = check(replace(asked, proposal_ned_m=None, others_ned_m=(), escape_ned_m=escape), params.checker)
     path = None
     if verdict.path_ned_m is not None and verdict.margin_m is not None:
-        lasts_s = params.policy.horizon_s if guarded else params.policy.path_lasts_s()
-        path = Path(verdict.path_ned_m, 0.0, verdict.margin_m, state.t_s, lasts_s)
+        path = Path(verdict.path_ned_m, 0.0, verdict.margin_m, state.t_s, *params.policy.wear(guarded))
     memory = replace(memory, policy=answer.memory, guard=way, decisions=memory.decisions + 1)
     return memory, replace(engaged, path=path, tried_t_s=state.t_s), Decision(asked.proposal_ned_m, verdict, guarded)
 

@@ -22,6 +22,7 @@ class Path:
     margin_m: float  # beyond the radius, at which it passed
     decided_t_s: float
     lasts_s: float  # then it is planned anew
+    used_up_m: float  # also with less than this left
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,13 +36,18 @@ class PolicyParams:
     horizon_s: float = param(0.4, "SN_PO_HORIZON", "The expert plans a path older than this anew", "s", 0.05, 10.0)
     learned_horizon_s: float = param(3.0, "SN_PO_L_HORIZON", "The same for a learned policy", "s", 0.05, 10.0)
     retry_s: float = param(0.2, "SN_PO_RETRY", "Least time between two decisions", "s", 0.0, 5.0)
-    used_up_m: float = param(1.0, "SN_PO_USED_UP", "A path with less than this left is used up", "m", 0.1, 10.0)
+    used_up_m: float = param(
+        1.0, "SN_PO_USED_UP", "The expert's path with less than this left is used up", "m", 0.1, 10
+    )
+    learned_used_up_m: float = param(2.0, "SN_PO_L_USED_UP", "The same for a learned policy", "m", 0.1, 10.0)
     lead_s: float = param(0.4, "SN_PO_LEAD", "A new path leaves the old one this far ahead", "s", 0.0, 2.0)
     rejoin_m: float = param(0.4, "SN_PO_REJOIN", "Farther off the old path than this, plan from the vehicle", "m", 0, 3)
 
-    def path_lasts_s(self) -> float:
-        """Age at which a path is due to be replaced."""
-        return self.horizon_s if self.name == GeometricExpert.name else self.learned_horizon_s
+    def wear(self, guarded: bool) -> tuple[float, float]:
+        """Age in s and length left in m at which a path is due to be replaced."""
+        if guarded or self.name == GeometricExpert.name:
+            return self.horizon_s, self.used_up_m
+        return self.learned_horizon_s, self.learned_used_up_m
 
 
 @dataclass(frozen=True, slots=True)

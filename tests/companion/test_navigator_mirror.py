@@ -112,7 +112,7 @@ class Pair:
     def follow(self, path_ne_m: F64) -> None:
         """From now on in RL mode along this path, no decision due."""
         assert self.here.engaged is not None and self.there.engaged is not None
-        path = Path(path_ne_m, 0.0, 0.1, self.here.t_s, 0.4)
+        path = Path(path_ne_m, 0.0, 0.1, self.here.t_s, 0.4, 1.0)
         rl = replace(self.here.engaged.arbiter, mode=NavMode.RL)
         self.here = replace(self.here, engaged=replace(self.here.engaged, arbiter=rl, path=path, tried_t_s=math.inf))
         self.there = replace(self.there, engaged=replace(self.there.engaged, arbiter=rl, tried_t_s=math.inf))
