@@ -67,7 +67,7 @@ class Brake:
         share = view.approach_m_s / view.task.cruise_m_s
         stick = share * np.array([math.cos(view.goal_course_rad), math.sin(view.goal_course_rad)])
         full_m_s2 = 2.0 * self._params.acc_hor_m_s2  # drag takes half of it on the way up to speed
-        ranges = _Ranges.of(view)
+        ranges = Ranges.of(view)
         pushed = constrained(full_m_s2 * stick, before, ranges, view.task.cruise_m_s, self._params)
         drag = full_m_s2 / view.task.cruise_m_s * _firmer_when_slow(before)
         after = before + (pushed - drag) * min(max(view.dt_s, 0.0), DT_MAX_S)
@@ -76,15 +76,16 @@ class Brake:
 
 
 @dataclass(frozen=True, slots=True)
-class _Ranges:
+class Ranges:
     """The present scan in local NED; ``range_m`` is nan where nothing is known."""
 
     course_rad: F64  # (72,)
     range_m: F64  # (72,)
 
     @staticmethod
-    def of(view: View) -> "_Ranges":
-        return _Ranges(BEARING_RAD + yaw_rad(view.state.q_ned_frd), view.percept.bearing_range_m)
+    def of(view: View) -> "Ranges":
+        """What perception made of the scan."""
+        return Ranges(BEARING_RAD + yaw_rad(view.state.q_ned_frd), view.percept.bearing_range_m)
 
     def sector(self, course_rad: float) -> int:
         """The one nearest to a course."""
@@ -95,7 +96,7 @@ class _Ranges:
         return np.array([math.cos(self.course_rad[sector]), math.sin(self.course_rad[sector])])
 
 
-def constrained(acc_m_s2: F64, vel_m_s: F64, ranges: _Ranges, cruise_m_s: float, params: BrakeParams) -> F64:
+def constrained(acc_m_s2: F64, vel_m_s: F64, ranges: Ranges, cruise_m_s: float, params: BrakeParams) -> F64:
     """The acceleration (2,) that collision prevention lets through; none where nothing is seen."""
     size = math.hypot(*acc_m_s2)
     if not size > 1e-3 or np.isnan(ranges.range_m).all():
@@ -121,7 +122,7 @@ def _firmer_when_slow(vel_m_s: F64) -> F64:
     return vel_m_s / math.sqrt(speed) if 0.0 < speed < 1.0 else vel_m_s
 
 
-def _guided(wanted: int, ranges: _Ranges, params: BrakeParams) -> int:
+def _guided(wanted: int, ranges: Ranges, params: BrakeParams) -> int:
     """The sector near the wanted one that sees farther, at a price for each sector of deviation."""
     bins = math.floor(params.cp_guide_deg / SECTOR_DEG)
     seen_m = np.minimum(ranges.range_m, FAR_M)
@@ -136,7 +137,7 @@ def _guided(wanted: int, ranges: _Ranges, params: BrakeParams) -> int:
     return best
 
 
-def _scaled(course: F64, ranges: _Ranges, cruise_m_s: float, params: BrakeParams) -> F64:
+def _scaled(course: F64, ranges: Ranges, cruise_m_s: float, params: BrakeParams) -> F64:
     """Share (2,) of the push that is left, taken apart into towards the nearest obstacle and along it."""
     nearest = int(np.argmin(np.where(np.isnan(ranges.range_m), np.inf, ranges.range_m)))
     towards = ranges.direction(nearest)
@@ -157,7 +158,7 @@ def _scale(distance_m: float, cruise_m_s: float, params: BrakeParams) -> float:
     return min((room_m / max(params.cp_dist_m, cruise_m_s / params.pos_p_1_s)) ** 2, 1.0)
 
 
-def _braking(vel_m_s: F64, ranges: _Ranges, params: BrakeParams) -> F64:
+def _braking(vel_m_s: F64, ranges: Ranges, params: BrakeParams) -> F64:
     """Acceleration (2,) away from the sector whose stopping speed is exceeded the most; none where none is.
 
     PX4 adds it where it is positive too, a push into the nearest sector: left out.

@@ -22,7 +22,7 @@ from companion.guidance import follower, limits
 from companion.navigator.track import course_along
 from mission.errors import InputError
 from mission.pilots import cockpit
-from mission.pilots.astar import Plan, committed
+from mission.pilots.astar import Plan
 from mission.pilots.cockpit import Memory, View, Wish, stop_needed
 from mission.pilots.interface import PilotNote
 from sitl.world import World
@@ -36,6 +36,13 @@ class OmplParams:
     """What the oracle may choose, tuned."""
 
     margin_m: float = param(0.2, "OMPL_MARGIN", "Planned clearance beyond the radius", "m", 0.0, 2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """What came of planning."""
+
+    plan: Plan | None  # None: there is no way
 
 
 class Ompl:
@@ -68,19 +75,19 @@ class Ompl:
         """See ``Pilot.tick``."""
         return cockpit.fly(memory, inputs, task, params, self._steer)
 
-    def _steer(self, view: View, plan: Plan | None) -> tuple[Plan | None, Wish]:
-        astray = plan is not None and len(committed(view, plan, 0.0)) == 1 and _off_m(view, plan) > BACK_M
-        due = plan is None or astray
-        if due:
-            plan = self._planned(view)
+    def _steer(self, view: View, own: Own | None) -> tuple[Own, Wish]:
+        due = own is None or (own.plan is not None and _off_m(view, own.plan) > BACK_M)
+        if own is None or due:
+            own = Own(self._planned(view))
+        plan = own.plan
         if plan is None or stop_needed(view):
-            return plan, Wish("blocked" if plan is None else "stop", decided=due)
+            return own, Wish("no way" if plan is None else "stop", decided=due)
         speed = _speed(view, plan)
         target = follower.Target(speed, view.down_m, view.yaw_sp_rad)
         followed = follower.follow(plan.path_ne_m, view.state, plan.s_m, target, view.params.follower)
         course = course_along(plan.path_ne_m, plan.s_m)
         wish = Wish("follow", setpoint=followed.setpoint, course_rad=course, decided=due, path_ne_m=plan.path_ne_m)
-        return replace(plan, s_m=followed.s_m), wish
+        return Own(replace(plan, s_m=followed.s_m)), wish
 
     def _planned(self, view: View) -> Plan | None:
         from mission.pilots.ompl_path import ompl_path  # OMPL is an extra

@@ -7,7 +7,9 @@ import math
 from itertools import count
 
 import numpy as np
+from numpy.typing import NDArray
 from ompl import base, geometric, util
+from scipy import ndimage
 
 from companion.core.types import F64
 from mission.world_check import clearance_grid, clearance_m
@@ -26,7 +28,7 @@ def ompl_path(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> 
     util.setLogLevel(util.LOG_NONE)
     util.RNG.setSeed(SEED)
     room = _Room(world, from_ned_m, to_ned_m, radius_m)
-    if not (room.free(from_ned_m) and room.free(to_ned_m)):
+    if not room.connected(from_ned_m, to_ned_m):
         return None
     space = base.RealVectorStateSpace(2)
     space.setBounds(_bounds(world))
@@ -52,35 +54,41 @@ def ompl_path(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> 
 
 
 class _Room:
-    """Where the disc fits: clearances on a grid, nearest cell."""
+    """Where the disc fits, by cell; round an end that is too near to something it is let out."""
 
     def __init__(self, world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> None:
-        ends_m = clearance_m(world, np.stack([from_ned_m, to_ned_m]))
-        self._radius_m = radius_m
-        self._field, self._cell_m = clearance_grid(world, radius_m + CELL_M, CELL_M)
+        field, self._cell_m = clearance_grid(world, radius_m + CELL_M, CELL_M)
+        self._fits: NDArray[np.bool_] = field >= radius_m
         self._low = np.array(world.bounds_m[:2])
-        self._ends = np.stack([from_ned_m, to_ned_m])
-        self._leave_m = radius_m - ends_m  # an end that is too near to something is free round it
+        self._last = np.array(field.shape) - 1
+        north, east = (low + np.arange(n) * self._cell_m for low, n in zip(self._low, field.shape, strict=True))
+        for end in (from_ned_m, to_ned_m):
+            out_m = max(radius_m - float(clearance_m(world, end[None])[0]), 0.0) + self._cell_m
+            self._fits |= np.hypot((north - end[0])[:, None], (east - end[1])[None, :]) <= out_m
+
+    def connected(self, from_ned_m: F64, to_ned_m: F64) -> bool:
+        """Is there any way?"""
+        labels, _ = ndimage.label(self._fits)
+        first, last = labels[tuple(self._cells(np.stack([from_ned_m, to_ned_m])).T)]
+        return bool(first == last != 0)
 
     def free(self, point_ned_m: F64) -> bool:
         """Does the disc fit at (2,)?"""
-        return bool(self.all_free(point_ned_m[None]))
-
-    def all_free(self, points_ned_m: F64) -> bool:
-        """Does it fit at every one of (n, 2)?"""
-        cells = np.rint((points_ned_m - self._low) / self._cell_m).astype(np.intp)
-        np.clip(cells, 0, np.array(self._field.shape) - 1, out=cells)
-        fits = self._field[cells[:, 0], cells[:, 1]] >= self._radius_m
-        if fits.all():
-            return True
-        for end, leave_m in zip(self._ends, self._leave_m, strict=True):
-            fits |= np.hypot(*(points_ned_m - end).T) <= max(leave_m, 0.0) + self._cell_m
-        return bool(fits.all())
+        return self._all_free(point_ned_m[None])
 
     def line_free(self, a_ned_m: F64, b_ned_m: F64) -> bool:
         """Does it fit all along a straight line?"""
         steps = max(2, math.ceil(math.dist(a_ned_m.tolist(), b_ned_m.tolist()) / self._cell_m))
-        return self.all_free(a_ned_m + (np.arange(steps + 1) / steps)[:, None] * (b_ned_m - a_ned_m))
+        return self._all_free(a_ned_m + (np.arange(steps + 1) / steps)[:, None] * (b_ned_m - a_ned_m))
+
+    def _all_free(self, points_ned_m: F64) -> bool:
+        cells = self._cells(points_ned_m)
+        return bool(self._fits[cells[:, 0], cells[:, 1]].all())
+
+    def _cells(self, points_ned_m: F64) -> NDArray[np.intp]:
+        cells = np.rint((points_ned_m - self._low) / self._cell_m).astype(np.intp)
+        inside: NDArray[np.intp] = np.clip(cells, 0, self._last)
+        return inside
 
 
 class _Motions(base.MotionValidator):  # type: ignore[misc]  # OMPL has no types

@@ -14,19 +14,31 @@ PILOTS: dict[str, tuple[str, str]] = {
     "vfh": ("mission.pilots.vfh", "Vfh"),
     "astar": ("mission.pilots.astar", "Astar"),
     "ompl": ("mission.pilots.ompl", "Ompl"),
+    "td3_vanilla": ("mission.pilots.td3_vanilla", "Td3Vanilla"),
     "geometric": ("mission.pilots.swiftnav", "SwiftNav"),
 }
 
 
 def pilot_names() -> list[str]:
-    """Every name that ``pilot_named`` knows, in the order of the tables."""
-    return list(PILOTS)
+    """The pilots that can fly here, in the order of the tables."""
+    return [name for name in PILOTS if name not in grounded()]
+
+
+def grounded() -> dict[str, str]:
+    """The pilots that cannot fly here, and why: a package or a trained policy is missing."""
+    reasons = {}
+    for name in PILOTS:
+        try:
+            pilot_named(name)
+        except InputError as error:
+            reasons[name] = str(error)
+    return reasons
 
 
 def pilot_named(name: str) -> Pilot:
-    """The pilot of that name. Raises InputError with the nearest name."""
+    """The pilot of that name. Raises InputError with the nearest name, or with what it lacks."""
     if name not in PILOTS:
-        raise InputError(f"unknown pilot '{name}'{nearest(name, pilot_names())}")
+        raise InputError(f"unknown pilot '{name}'{nearest(name, list(PILOTS))}")
     module, factory = PILOTS[name]
     make: Callable[[], Pilot] = getattr(import_module(module), factory)
     return make()
