@@ -1,4 +1,4 @@
-"""What is said of a suite that has been flown? An object for machines, a table for people, a log like published ones."""
+"""What is said of a flown suite? One object for machines, a table for people, a log as the published ones."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -48,6 +48,7 @@ YARD_RULES: Final = Rules(
     range_m=4.0,
 )
 TRACK_GOAL_M: Final = 1.0
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +127,8 @@ PARTS: Final[dict[str, Callable[[tuple[Course, ...]], tuple[Course, ...]]]] = {
 }
 
 
-def spread(courses: tuple[Course, ...]) -> tuple[Course, ...]:
-    """The same courses in an order in which every first few are spread over all of them."""
+def spread(courses: tuple[Item, ...]) -> tuple[Item, ...]:
+    """The same items in an order in which every first few are spread over all of them."""
     golden = (5.0**0.5 - 1.0) / 2.0
     order = sorted(range(len(courses)), key=lambda i: (i * golden) % 1.0)
     return tuple(courses[i] for i in order)
