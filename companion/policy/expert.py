@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from companion.core.geometry import length, resample
 from companion.core.gridmap import NEVER, GridMap, MapParams, cells_of, centres, occupied
@@ -34,11 +35,13 @@ class ExpertParams:
     keep_ratio: float = param(1.12, "SN_EX_KEEP", "The old path stays until a new one is this much cheaper", "", 1, 3)
     length_m: float = param(8.0, "SN_EX_LENGTH", "Length of the five waypoints at most", "m", 1.0, 20.0)
     chord_m: float = param(0.06, "SN_EX_CHORD", "How far a chord may leave the path", "m", 0.01, 0.5)
+    useful_m: float = param(3.0, "SN_EX_USEFUL", "Chords are relaxed where waypoints reach less far", "m", 0.2, 10.0)
     sweeps: int = param(25, "SN_EX_SWEEPS", "Elastic-band sweeps that smooth the path", "", 0, 200)
+    push_m: float = param(0.0, "SN_EX_PUSH", "How far each sweep pushes off what is too near (0: not)", "m", 0.0, 0.05)
+    push_to_m: float = param(0.15, "SN_EX_PUSH_TO", "Clearance beyond the radius up to which it does", "m", 0.0, 1.0)
 
 
 BORDER_CELLS = 2  # paths to a goal outside the map end in this rim
-SHORTEST_USEFUL_M = 3.0  # five waypoints should reach at least this far, else the chords are relaxed
 CHORD_RELAX = (1.0, 2.0, 4.0)
 CHORD_POINTS = 20  # of the path that one chord replaces, at most
 UNREACHED = 4.0  # cost a cell from where a way ends to a goal on the map: that is approached as near as possible
@@ -51,6 +54,7 @@ class _Field:
     cost: F64  # (n, n)
     clearance_m: F64  # (n, n)
     hard_m: float
+    hits_ne_m: F64  # (k, 2) what the clearance was measured from
 
 
 class GeometricExpert:
@@ -64,9 +68,10 @@ class GeometricExpert:
 
     def propose(self, query: Query, memory: F64 | None) -> tuple[Proposal | None, F64 | None]:
         """Five waypoints along the cheapest path; see ``Policy.propose``."""
-        clearance = clearance_field(*_with_hazards(query, occupied(query.grid, query.state.t_s, self._map)))
+        grid, hits = _with_hazards(query, occupied(query.grid, query.state.t_s, self._map))
+        clearance, hits_ne_m = clearance_field(grid, hits), grid.hit_ne_m[hits].astype(np.float64)
         for margin in (self._params.margin_m, self._params.tight_m):
-            field = _field(query, clearance, query.radius_m + margin, self._params)
+            field = _field(query, clearance, hits_ne_m, query.radius_m + margin, self._params)
             path = _plan(query, field, memory, self._params)
             if path is not None:
                 return Proposal(_cut(_joined(query.prefix_ne_m, path), self._params)), path
@@ -84,7 +89,7 @@ def _with_hazards(query: Query, hits: NDArray[np.bool_]) -> tuple[GridMap, NDArr
     return replace(query.grid, hit_ne_m=hit_ne_m), hits
 
 
-def _field(query: Query, clearance_m: F64, hard_m: float, params: ExpertParams) -> _Field:
+def _field(query: Query, clearance_m: F64, hits_ne_m: F64, hard_m: float, params: ExpertParams) -> _Field:
     """Cost per cell: length, nearness to hits, the unknown, and walls near by."""
     comfort_m = query.radius_m + params.comfort_m
     lack = np.clip((comfort_m - clearance_m) / (comfort_m - query.radius_m), 0.0, 1.0)
@@ -103,7 +108,7 @@ def _field(query: Query, clearance_m: F64, hard_m: float, params: ExpertParams) 
         blocked &= (clearance_m < here_m - grid.cell_m / 2) | (square > 1.0)
         cost += params.far_cost * (tight & near)
     cost[blocked] = BLOCKED
-    return _Field(cost, clearance_m, hard_m)
+    return _Field(cost, clearance_m, hard_m, hits_ne_m)
 
 
 def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) -> F64 | None:
@@ -119,7 +124,7 @@ def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) ->
         worth = _path_cost(kept, query, field) / (params.keep_ratio * grid.cell_m)
         detour = worth - float(ahead.ravel()[source])
     cells = _cheapest(field.cost, source, ahead, detour) if detour > 0.0 else None
-    return kept if cells is None else _smooth(_places(cells, query), grid, field, params.sweeps)
+    return kept if cells is None else _smooth(_places(cells, query), query, field, params)
 
 
 def _straight_cells(query: Query) -> F64:
@@ -193,16 +198,36 @@ def _path_cost(path: F64, query: Query, field: _Field) -> float:
     return float(step @ np.minimum(cost, BLOCKED)) + rest
 
 
-def _smooth(path: F64, grid: GridMap, field: _Field, sweeps: int) -> F64:
-    """Elastic band: pull every point to the middle of its neighbours while its clearance allows it."""
-    path = path.copy()
+def _smooth(path: F64, query: Query, field: _Field, params: ExpertParams) -> F64:
+    """Elastic band: pull every point to the middle of its neighbours while its clearance allows it; or push it there.
+
+    Cells are too coarse where a gap leaves a few centimetres: there the hits themselves push, to the middle of the gap.
+    """
+    if len(path) <= 2:
+        return path.copy()
+    if params.push_m > 0.0 and len(field.hits_ne_m):
+        return _centred(path, field.hits_ne_m, query.radius_m + params.push_to_m, params)
+    grid = query.grid
     floor = np.minimum(_sample(grid, field.clearance_m, path), field.hard_m + 2 * grid.cell_m) - grid.cell_m / 4
-    for _ in range(sweeps if len(path) > 2 else 0):
+    for _ in range(params.sweeps):
         moved = path.copy()
         moved[1:-1] = 0.5 * path[1:-1] + 0.25 * (path[2:] + path[:-2])
         fine = _sample(grid, field.clearance_m, moved) >= floor
         fine[0] = fine[-1] = True
         path = np.where(fine[:, None], moved, path)
+    return path
+
+
+def _centred(path: F64, hits_ne_m: F64, want_m: float, params: ExpertParams) -> F64:
+    """Every sweep: to the middle of the neighbours, then off the nearest hit, by ``push_m`` at most."""
+    path = path.copy()
+    tree = cKDTree(hits_ne_m)
+    for _ in range(params.sweeps):
+        path[1:-1] = 0.5 * path[1:-1] + 0.25 * (path[2:] + path[:-2])
+        distance, nearest = tree.query(path[1:-1], distance_upper_bound=want_m)
+        near = np.flatnonzero(distance < want_m)
+        step = np.minimum(want_m - distance[near], params.push_m) / np.maximum(distance[near], 1e-6)
+        path[1 + near] += (path[1 + near] - hits_ne_m[nearest[near]]) * step[:, None]
     return path
 
 
@@ -215,7 +240,7 @@ def _cut(path: F64, params: ExpertParams) -> F64:
     """At most five waypoints (k, 2) whose chords stay near the path."""
     for relax in CHORD_RELAX:
         waypoints = _chords(path, params.chord_m * relax, params.length_m)
-        if length(np.concatenate([path[:1], waypoints])) >= SHORTEST_USEFUL_M or len(waypoints) < WAYPOINTS:
+        if length(np.concatenate([path[:1], waypoints])) >= params.useful_m or len(waypoints) < WAYPOINTS:
             break
     return waypoints
 
