@@ -52,14 +52,14 @@ def evaluate(
     require_extra("sitl", "eval")
     if guard not in SWITCH:
         raise InputError(f"--guard '{guard}' wants on or off")
-    from mission.training.baselines import check_policy
+    from mission.training.baselines import policy_for
     from mission.training.evaluate import EvalSpec, fly_many
     from mission.training.flights import plan_in
     from mission.training.scores import summary
 
-    check_policy(policy)
     spec = EvalSpec(policy, world, SWITCH[guard])
-    plan_in(world, seed, spec.overrides())  # mistakes are told before processes start
+    plan = plan_in(world, seed, spec.overrides())
+    policy_for(policy, plan.params, seed)  # mistakes are told before anything flies
     flights = _shown(fly_many(spec, range(seed, seed + episodes), jobs), episodes, f"{policy} in {world}", json)
     settings = {"policy": policy, "world": world, "guard": SWITCH[guard], "seed": seed}
     figures = {**settings, **summary(flights)}

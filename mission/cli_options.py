@@ -78,8 +78,10 @@ def parse_firmware(name: str, px4_bin: Path | None) -> tuple["Firmware", "Px4Bui
     return firmware, find_build(px4_bin) if firmware is Firmware.PX4 and px4_bin is not None else None
 
 
-def parse_overrides(file: Path | None, settings: list[str] | None) -> dict[str, dict[str, Any]]:
-    """The parameter file with the ``--param`` settings on top, nested, unchecked. Raises InputError."""
+def parse_overrides(
+    file: Path | None, settings: list[str] | None, option: str = "--param", form: str = "GROUP.FIELD=VALUE"
+) -> dict[str, dict[str, Any]]:
+    """The parameter file with the settings of an option on top, nested, unchecked. Raises InputError."""
     from mission.strict_yaml import read_yaml
 
     overrides: dict[str, dict[str, Any]] = read_yaml(file) if file else {}
@@ -87,7 +89,7 @@ def parse_overrides(file: Path | None, settings: list[str] | None) -> dict[str, 
         key, separator, text = setting.partition("=")
         group, dot, field = key.partition(".")
         if not (separator and dot):
-            raise InputError(f"--param '{setting}' wants GROUP.FIELD=VALUE")
+            raise InputError(f"{option} '{setting}' wants {form}")
         overrides[group] = {**(overrides.get(group) or {}), field: _value(text)}
     return overrides
 

@@ -69,7 +69,7 @@ def train(
             raise InputError("--resume goes on with a run as it was begun: no --world, --set or --out beside it")
         folder, spec = resume, open_run(resume)
     else:
-        chosen = load_preset(preset, parse_overrides(None, setting))
+        chosen = load_preset(preset, parse_overrides(None, setting, "--set", "SECTION.FIELD=VALUE"))
         numbers = tuple(range(seed, seed + seeds))
         until = Until(until_successes, max_episodes)
         spec = RunSpec(world or DEFAULT_WORLD, chosen, numbers, until, device)

@@ -140,8 +140,9 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 def _json(path: Path) -> dict[str, Any]:
+    text = _bytes(path)
     try:
-        data = json.loads(_bytes(path))
+        data = json.loads(text)
     except ValueError as error:
         raise PolicyError(f"{path}: not JSON: {error}") from error
     if not isinstance(data, dict):

@@ -77,7 +77,7 @@ def run_fleet(job: Job, seeds: Sequence[int], folder: Path, jobs: int, on_update
 def folder_lock(folder: Path) -> Iterator[None]:
     """Hold the folder for this process. Raises InputError when another one keeps it."""
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / LOCK).open("w") as file:
+    with (folder / LOCK).open("a+") as file:
         deadline_s = time.monotonic() + LOCK_S
         while True:
             try:
@@ -87,6 +87,9 @@ def folder_lock(folder: Path) -> Iterator[None]:
                 if time.monotonic() > deadline_s:
                     raise InputError(f"{folder} is being trained in by another process") from error
                 time.sleep(0.1)
+        file.truncate(0)
+        file.write(str(os.getpid()))  # for people
+        file.flush()
         yield
 
 
