@@ -26,6 +26,7 @@ SUMMED_UP = (
     ("modified", ""),
     ("escape", ""),
     ("refused", ""),
+    ("guarded", "expert's path flown instead, share"),
     ("rl_share", "of the time in RL mode"),
     ("decision_p50_ms", "wall time of a tick with a decision"),
     ("decision_p99_ms", ""),

@@ -75,7 +75,8 @@ def train(
         spec = RunSpec(world or DEFAULT_WORLD, chosen, numbers, until, device)
         check(spec)
         folder = make_run(spec, out)
-    title = f"{spec.world}, preset {spec.preset.name}, {len(spec.seeds)} seeds until {spec.until.successes} successes"
+    asked = f"seeds: {len(spec.seeds)}, each until {spec.until.successes} successes"
+    title = f"{spec.world}, preset {spec.preset.name}, {asked}"
     with FleetView(title, quiet=json) as view:
         members = train_fleet(spec, folder, jobs or cores(), cluster, view.update)
     report = run_report(spec, folder, members)

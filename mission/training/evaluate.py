@@ -45,8 +45,7 @@ class EvalSpec:
 
     def overrides(self) -> dict[str, dict[str, Any]]:
         """Of the companion's parameters: the expert's paths last less long than those of others."""
-        guard = {"guard": True} if self.guard else {}
-        return {"policy": {"name": self.policy, **guard}}
+        return {"policy": {"name": self.policy, "guard": self.guard}}
 
 
 @dataclass(slots=True)
@@ -56,6 +55,7 @@ class _Pilot:
     policy: Policy
     verdicts: Counter[str] = field(default_factory=Counter)
     tick_ms: list[float] = field(default_factory=list)
+    guarded: int = 0
     rl_time_s: float = 0.0
     t_s: float = 0.0  # of the last tick
     switches: int = 0
@@ -82,7 +82,8 @@ class _Pilot:
             self.switches, self.switches_bound = engaged.arbiter.switches, record.switches_bound
             self.rl_time_s += t_s - self.t_s if engaged.arbiter.mode == NavMode.RL else 0.0
         self.t_s = t_s
-        if record.decision is not None and record.decision.verdict is not None:
+        if record.decision is not None:
+            self.guarded += record.decision.guarded
             self.verdicts[str(record.decision.verdict.kind)] += 1
 
 
@@ -126,6 +127,7 @@ def fly_plan(plan: FlightPlan, policy: Policy) -> FlightFigures:
         switches_bound=pilot.switches_bound,
         rl_time_s=pilot.rl_time_s,
         verdicts=dict(pilot.verdicts),
+        guarded=pilot.guarded,
         tick_ms=tuple(pilot.tick_ms[WARMUP:]),
     )
 

@@ -71,7 +71,7 @@ def draw_learning(folder: Path, picture: Path, title: str) -> None:
     draw_curve(axes[0], learning_curve(seeds, "steps"), CURVE_COLOUR, "steps")
     draw_curve(axes[1], learning_curve(seeds, "return"), RETURN_COLOUR, "return")
     draw_evaluations(axes[2], read_seeds(folder, "evaluations"))
-    figure.suptitle(f"{title}: {len(seeds)} seeds, {WINDOW}-episode means", color=INK, x=0.01, ha="left", fontsize=11)
+    figure.suptitle(f"{title}; seeds: {len(seeds)}; {WINDOW}-episode means", color=INK, x=0.01, ha="left", fontsize=11)
     figure.savefig(picture, dpi=DPI)
 
 

@@ -34,6 +34,7 @@ class FlightFigures:
     switches_bound: int
     rl_time_s: float
     verdicts: dict[str, int]
+    guarded: int  # decisions in which the guard flew the expert's path instead
     tick_ms: tuple[float, ...]  # wall time of every tick with a decision
 
     @property
@@ -77,6 +78,7 @@ def summary(flights: Sequence[FlightFigures]) -> dict[str, Any]:
         "above_bound": sum(f.switches > f.switches_bound for f in flights),
         "decisions": verdicts.total(),
         **{str(kind): verdicts[kind] / verdicts.total() if verdicts else None for kind in VerdictKind},
+        "guarded": sum(f.guarded for f in flights) / verdicts.total() if verdicts else None,
         "rl_share": sum(f.rl_time_s for f in flights) / (60.0 * minutes) if minutes else None,
         "decision_p50_ms": float(np.percentile(tick_ms, 50)) if tick_ms else None,
         "decision_p99_ms": float(np.percentile(tick_ms, 99)) if tick_ms else None,

@@ -29,6 +29,7 @@ WON = FlightFigures(
     switches_bound=31,
     rl_time_s=15.0,
     verdicts={"kept": 3, "modified": 1},
+    guarded=2,
     tick_ms=(1.0, 2.0, 3.0),
 )
 LOST = dataclasses.replace(
@@ -46,6 +47,7 @@ def test_the_figures_of_two_flights_worked_out_by_hand() -> None:
     assert figures["switches_per_min"] == pytest.approx(3.0)
     assert figures["switches_bound_per_min"] == pytest.approx(31.0)
     assert (figures["kept"], figures["modified"], figures["refused"]) == (0.375, 0.125, 0.5)
+    assert figures["guarded"] == 0.5
     assert figures["rl_share"] == pytest.approx(0.25)
     assert figures["decision_p50_ms"] == 2.0
     assert figures["failures"] == [{"seed": 2, "world": "w", "reason": "time"}]
