@@ -103,7 +103,7 @@ def assemble(spec: RunSpec, seed: int) -> tuple[TD3, Parts]:
 
 @dataclass(slots=True)
 class _Evaluation:
-    """Greedy flights on flights of their own; at first beside policies that learn nothing."""
+    """Greedy flights on draws of their own; the first seed's first one beside policies that learn nothing."""
 
     spec: RunSpec
     seed: int
@@ -114,7 +114,7 @@ class _Evaluation:
         params = navigator_params(config)
         greedy = LearnedPolicy(GREEDY, self.learner.actor(), config.policy_spec(), params.map)
         row = {GREEDY: self._figures(greedy)}
-        if episode == 0:
+        if episode == 0 and self.seed == self.spec.seeds[0]:
             row[STRAIGHT] = self._figures(StraightPolicy())
             row[RANDOM] = self._figures(RandomPolicy(self.seed, config.decoder))
         return row
