@@ -3,6 +3,9 @@
 import io
 import os
 import signal
+import subprocess
+import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -92,3 +95,27 @@ def test_without_a_terminal_there_are_lines_and_quiet_says_nothing() -> None:
         lines = out.getvalue().splitlines()
         assert len(lines) == (0 if quiet else 3)
         assert quiet or ("done" in lines[2] and "successes 3" in lines[2])
+
+
+def patient(seed: int, folder: Path) -> Iterator[Status]:
+    """An episode every tenth of a second, for a minute."""
+    for _ in range(600):
+        time.sleep(0.1)
+        (folder / "alive").touch()
+        yield _status(seed, 1)
+
+
+def test_no_orphan_goes_on_training_when_the_fleet_is_killed(tmp_path: Path) -> None:
+    code = (
+        "import sys; from pathlib import Path; from test_training_fleet import patient\n"
+        "from mission.training.fleet import run_fleet; run_fleet(patient, [1], Path(sys.argv[1]), 1, lambda _: None)"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    parent = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], env=environment)
+    while not (tmp_path / "seed_1" / "alive").exists():
+        assert parent.poll() is None
+        time.sleep(0.05)
+    parent.kill()
+    parent.wait()
+    with folder_lock(tmp_path / "seed_1"):  # waits for an orphan to notice, not for a minute
+        pass

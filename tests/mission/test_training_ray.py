@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -80,8 +80,8 @@ def test_a_cluster_that_is_not_there_is_told(tmp_path: Path) -> None:
             run_ray_fleet(PendulumJob(1), [1], tmp_path, address, 1, _nobody)
 
 
-def _nobody(members: object) -> None:
-    assert all(isinstance(member, Member) for member in members)  # type: ignore[attr-defined]
+def _nobody(members: Sequence[Member]) -> None:
+    assert all(isinstance(member, Member) for member in members)
 
 
 def _with_tests_on_path(monkeypatch: pytest.MonkeyPatch) -> None:
