@@ -32,11 +32,6 @@ class Stopwatch:
         self.seconds[old] = self.seconds.get(old, 0.0) - seconds
         self.seconds[new] = self.seconds.get(new, 0.0) + seconds
 
-    def shares(self) -> dict[str, float]:
-        """Fractions of the sum, by name."""
-        total_s = sum(self.seconds.values())
-        return {name: spent_s / total_s for name, spent_s in self.seconds.items()} if total_s else {}
-
     def _close_innermost(self, now_s: float) -> None:
         if self._open:
             name, since_s = self._open[-1]
