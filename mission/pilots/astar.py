@@ -31,6 +31,7 @@ UNREACHED = 4.0  # cost per cell between where a way ends and a goal on the map
 SAMPLES_PER_CELL = 2.0
 DEARER = 1.02  # a straight stretch may cost this much more than the steps that it replaces
 LOOK = 40  # steps that one straight stretch replaces at most
+LEAVE_M = 1.0  # round a vehicle that is too near to something
 RIM_CELLS = 2  # paths to a goal outside the map end in this rim
 
 
@@ -39,6 +40,9 @@ class AstarParams:
     """The costmap and how often it is planned on, tuned."""
 
     margin_m: float = param(0.15, "AST_MARGIN", "Cells nearer than radius and this block", "m", 0.0, 2.0)
+    tight_m: float = param(0.02, "AST_TIGHT", "The same where there is no other way", "m", 0.0, 2.0)
+    hard_range_m: float = param(3.0, "AST_HARD", "Cells farther away than this cost, but do not block", "m", 0.5, 40.0)
+    far_cost: float = param(12.0, "AST_FAR", "Extra cost of those", "", 0.0, 200.0)
     inflation: float = param(8.0, "AST_INFL", "Extra cost at the edge of what blocks", "", 0.0, 100.0)
     decay_1_m: float = param(3.0, "AST_DECAY", "How fast that cost decays with distance", "1/m", 0.1, 20.0)
     period_s: float = param(0.4, "AST_PERIOD", "Time between two plans", "s", 0.05, 5.0)
@@ -52,6 +56,7 @@ class Plan:
     path_ne_m: F64  # (k, 2)
     s_m: float
     t_s: float
+    margin_m: float  # beyond the radius, at which it was planned
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,12 +92,13 @@ class Astar:
             plan = replan(view, plan, self._params)
         if plan is None or stop_needed(view):
             return None, Wish("blocked" if plan is None else "stop", decided=due)
-        plan, wish = follow(view, plan, view.params.vehicle.corridor_m)
+        plan, wish = follow(view, plan)
         return plan, replace(wish, decided=due)
 
 
-def follow(view: View, plan: Plan, margin_m: float) -> tuple[Plan, Wish]:
+def follow(view: View, plan: Plan) -> tuple[Plan, Wish]:
     """One tick along a path, with the navigator's limits and follower."""
+    margin_m = min(view.params.vehicle.corridor_m, plan.margin_m)
     route = Route(plan.path_ne_m, plan.s_m, view.task.cruise_m_s, view.down_m, margin_m)
     tracked = track(route, view.state, view.percept, view.yaw_sp_rad, view.params)
     course = course_along(plan.path_ne_m, plan.s_m)
@@ -101,13 +107,21 @@ def follow(view: View, plan: Plan, margin_m: float) -> tuple[Plan, Wish]:
 
 
 def replan(view: View, old: Plan | None, params: AstarParams) -> Plan | None:
-    """A path from a little ahead on the old one (else every plan forgives the tracking error), or from here."""
+    """A path from a little ahead on the old one (else every plan forgives the tracking error), or from here.
+
+    The last resort knows that a cell's centre may lie half a cell beside the middle of a gap.
+    """
+    grid = view.percept.grid
+    clearance_m = clearance_field(grid, occupied(grid, view.state.t_s, view.params.map))
+    _swept(clearance_m, grid, view)
     prefix = committed(view, old, params.lead_s)
-    path = cheapest_path(view, prefix[-1], params)
-    if path is None and len(prefix) > 1:
-        prefix = prefix[:1]
-        path = cheapest_path(view, prefix[0], params)
-    return None if path is None else Plan(np.concatenate([prefix[:-1], path]), 0.0, view.state.t_s)
+    for margin_m in (params.margin_m, params.tight_m, params.tight_m - grid.cell_m / 2):
+        costmap = costmap_of(view, clearance_m, view.params.vehicle.radius_m + margin_m, params)
+        for begin in (prefix, prefix[:1]) if len(prefix) > 1 else (prefix,):
+            path = cheapest_path(view, begin[-1], costmap)
+            if path is not None:
+                return Plan(np.concatenate([begin[:-1], path]), 0.0, view.state.t_s, max(margin_m, 0.0))
+    return None
 
 
 def committed(view: View, old: Plan | None, lead_s: float) -> F64:
@@ -121,9 +135,8 @@ def committed(view: View, old: Plan | None, lead_s: float) -> F64:
     return geometry.part(old.path_ne_m, at.s_m, at.s_m + float(np.hypot(*view.vel_ne_m_s)) * lead_s)
 
 
-def cheapest_path(view: View, from_ne_m: F64, params: AstarParams) -> F64 | None:
+def cheapest_path(view: View, from_ne_m: F64, costmap: Costmap) -> F64 | None:
     """(k, 2) from a place to the goal, or as far towards it as the map reaches; None: shut in."""
-    costmap = costmap_of(view, params)
     grid, goal = costmap.grid, view.task.goal_ned_m
     north, east = centres(grid)
     ahead: F64 = np.hypot((north - goal[0])[:, None], (east - goal[1])[None, :]) / grid.cell_m
@@ -143,18 +156,25 @@ def cheapest_path(view: View, from_ne_m: F64, params: AstarParams) -> F64 | None
     return straightened(path, costmap)
 
 
-def costmap_of(view: View, params: AstarParams) -> Costmap:
+def costmap_of(view: View, clearance_m: F64, hard_m: float, params: AstarParams) -> Costmap:
     """Cost of every cell: 1, more near obstacles, BLOCKED where the disc does not fit.
 
-    A vehicle that is already nearer than it should be may leave through cells no nearer than its own.
+    Far away a sector's minimum closes gaps that are open: there, what blocks is only dear.
+
+    A vehicle that is already nearer than it should be may leave through cells no nearer than its own, up to LEAVE_M.
     """
     grid = view.percept.grid
-    clearance_m = clearance_field(grid, occupied(grid, view.state.t_s, view.params.map))
-    _swept(clearance_m, grid, view)
-    hard_m = view.params.vehicle.radius_m + params.margin_m
     cost: F64 = 1.0 + params.inflation * np.exp(-params.decay_1_m * np.maximum(clearance_m - hard_m, 0.0))
+    blocked = clearance_m < hard_m
     here_m = float(clearance_m.ravel()[_cell(grid, view.pos_ne_m)])
-    cost[clearance_m < min(hard_m, here_m - grid.cell_m / 2)] = BLOCKED
+    north, east = centres(grid)
+    away_m = np.hypot((north - view.pos_ne_m[0])[:, None], (east - view.pos_ne_m[1])[None, :])
+    far = blocked & (away_m > params.hard_range_m)
+    cost += params.far_cost * far
+    blocked &= ~far
+    if here_m < hard_m:
+        blocked &= (clearance_m < here_m - grid.cell_m / 2) | (away_m > LEAVE_M)
+    cost[blocked] = BLOCKED
     return Costmap(grid, cost)
 
 

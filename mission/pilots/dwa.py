@@ -25,7 +25,6 @@ from mission.pilots.interface import PilotNote
 
 DIRECTIONS = 72
 SPEEDS = 8
-SLOWEST_SHARE = 1e-3  # of the cap: below it a way has no direction
 WAYS = np.arange(DIRECTIONS, dtype=np.float64) * (math.tau / DIRECTIONS)
 
 
@@ -40,7 +39,9 @@ class DwaParams:
     acc_m_s2: float = param(3.0, "DWA_ACC", "Acceleration that spans the window", "m/s2", 0.2, 7.0)
     decel_m_s2: float = param(2.5, "DWA_DECEL", "Deceleration that a velocity must be stopped with", "m/s2", 0.2, 7.0)
     delay_s: float = param(0.3, "DWA_DELAY", "Time that passes before braking bites", "s", 0.0, 2.0)
-    margin_m: float = param(0.15, "DWA_MARGIN", "Margin beyond the radius", "m", 0.0, 2.0)
+    tight_m: float = param(0.05, "DWA_TIGHT", "Margin beyond the radius, standing", "m", 0.0, 2.0)
+    margin_m: float = param(0.25, "DWA_MARGIN", "The same at scale_m_s, growing with speed between", "m", 0.0, 2.0)
+    scale_m_s: float = param(3.0, "DWA_SCALE", "Speed of the full margin", "m/s", 0.1, 20.0)
     reach_m: float = param(4.0, "DWA_REACH", "Free way that is as good as any", "m", 0.5, 20.0)
 
 
@@ -65,13 +66,14 @@ class Dwa:
 
     def _steer(self, view: View, own: None) -> tuple[None, Wish]:
         params = self._params
-        radius_m = view.params.vehicle.radius_m + params.margin_m
-        near = points_near(view.pos_ne_m[None], view.percept.points_ne_m, params.reach_m + radius_m)
+        hull_m = view.params.vehicle.radius_m
+        near = points_near(view.pos_ne_m[None], view.percept.points_ne_m, params.reach_m + hull_m + params.margin_m)
         # a tick and a half of delay is flown at the present velocity, whatever is asked for now
         begin = view.pos_ne_m + view.vel_ne_m_s * view.params.follower.delay_s
         course_rad: F64 = view.goal_course_rad + WAYS
-        free_m = free_ways(begin, course_rad, near, radius_m, params.reach_m)
-        best = best_velocity(view, course_rad, free_m, params)
+        radii = [hull_m + margin(speed, params) for speed in _speeds(view.approach_m_s).tolist()]
+        free = np.stack([free_ways(begin, course_rad, near, radius, params.reach_m) for radius in radii], axis=1)
+        best = best_velocity(view, course_rad, free, params)
         return None, Wish("dwa", best, course_rad=view.goal_course_rad if best is None else None)
 
 
@@ -91,6 +93,12 @@ def free_ways(begin_ne_m: F64, course_rad: F64, points_ne_m: F64, radius_m: floa
     return free_m
 
 
+def margin(speed_m_s: float, params: DwaParams) -> float:
+    """Beyond the radius at that speed: the footprint grows with speed, as in ROS's dwa_local_planner."""
+    share = min(speed_m_s / params.scale_m_s, 1.0)
+    return params.tight_m + share * max(params.margin_m - params.tight_m, 0.0)
+
+
 def stop_speed(free_m: F64, params: DwaParams) -> F64:
     """Largest admissible speed for each free way: what stops within it, delay counted."""
     lag = params.decel_m_s2 * params.delay_s
@@ -99,11 +107,14 @@ def stop_speed(free_m: F64, params: DwaParams) -> F64:
 
 
 def best_velocity(view: View, course_rad: F64, free_m: F64, params: DwaParams) -> F64 | None:
-    """The admissible velocity (2,) in the window with the best objective; None: there is none, brake."""
+    """The admissible velocity (2,) in the window with the best objective; None: there is none, brake.
+
+    ``free_m``: (k, SPEEDS), the free way of each course for the footprint of each speed.
+    """
     cap = view.approach_m_s
     velocity = _candidates(view, course_rad, cap)
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    free = np.repeat(free_m, SPEEDS)
+    free = free_m.ravel()
     fits = (speed <= stop_speed(free, params) + 1e-9) & _in_window(velocity, view, params)
     if not fits.any():
         return None
@@ -119,10 +130,14 @@ def best_velocity(view: View, course_rad: F64, free_m: F64, params: DwaParams) -
 
 def _candidates(view: View, course_rad: F64, cap_m_s: float) -> F64:
     """(k * SPEEDS, 2) velocities: every course at every speed up to the cap."""
-    speed = cap_m_s * np.arange(1, SPEEDS + 1) / SPEEDS
     direction = np.stack([np.cos(course_rad), np.sin(course_rad)], axis=1)
-    velocities: F64 = (direction[:, None, :] * speed[None, :, None]).reshape(-1, 2)
+    velocities: F64 = (direction[:, None, :] * _speeds(cap_m_s)[None, :, None]).reshape(-1, 2)
     return velocities
+
+
+def _speeds(cap_m_s: float) -> F64:
+    speeds: F64 = cap_m_s * np.arange(1, SPEEDS + 1) / SPEEDS
+    return speeds
 
 
 def _in_window(velocity: F64, view: View, params: DwaParams) -> NDArray[np.bool_]:

@@ -95,9 +95,10 @@ class Ompl:
         assert self._world is not None  # start refuses
         begin, end = view.pos_ne_m + self._spawn_ned_m, view.task.goal_ned_m + self._spawn_ned_m
         for share in SHARES:
-            path = ompl_path(self._world, begin, end, view.params.vehicle.radius_m + share * self._params.margin_m)
+            margin_m = share * self._params.margin_m
+            path = ompl_path(self._world, begin, end, view.params.vehicle.radius_m + margin_m)
             if path is not None:
-                return Plan(path - self._spawn_ned_m, 0.0, view.state.t_s)
+                return Plan(path - self._spawn_ned_m, 0.0, view.state.t_s, margin_m)
         return None
 
 

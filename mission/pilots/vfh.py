@@ -36,6 +36,8 @@ SECTORS = 72
 SECTOR_RAD = math.tau / SECTORS
 COURSES = np.arange(SECTORS) * SECTOR_RAD  # from north
 BARRIER_ROUNDS = 4
+WINDOWS = (1.0, 0.6, 0.35)  # shares of window and sub-goal distance that are tried
+TOWARDS_RAD = math.pi / 4.0  # a course within this of the sub-goal's leads towards it
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +108,7 @@ class Vfh:
             own = self._decided(view, own, near)
         if own.course_rad is None:
             return own, Wish("blocked", decided=planned)
-        velocity = self._velocity(view, own.course_rad, near)
+        velocity = self._velocity(view, own.course_rad, near, own.plan)
         path = None if plan is None else plan.path_ne_m
         return own, Wish("vfh", velocity, decided=planned, path_ne_m=path)
 
@@ -120,18 +122,28 @@ class Vfh:
         return plan, due
 
     def _decided(self, view: View, own: Own, near: F64) -> Own:
-        radius_m = view.params.vehicle.radius_m + self._params.margin_m
-        target = view.task.goal_ned_m
-        if own.plan is not None:
-            target = geometry.point_at(own.plan.path_ne_m, own.plan.s_m + self._params.subgoal_m)
-        blocked = histogram(view.pos_ne_m, near, radius_m, own.blocked, self._params)
+        """Look at less and less around, and at a nearer sub-goal, until an opening leads towards it."""
         moving = float(np.hypot(*view.vel_ne_m_s)) > cockpit.COURSE_FROM_M_S
         flown = math.atan2(*view.vel_ne_m_s[::-1]) if moving else None
-        root = _Step(view.pos_ne_m, blocked, flown, own.course_rad)
-        course = best_course(root, target, near, radius_m, self._params)
+        margin_m = self._params.margin_m
+        if own.plan is not None:
+            margin_m = min(margin_m, own.plan.margin_m)  # no more than the plan found room for
+        radius_m = view.params.vehicle.radius_m + margin_m
+        course, blocked = None, own.blocked
+        for share in WINDOWS:
+            params = replace(self._params, window_m=share * self._params.window_m)
+            target = self._target(view, own.plan, share * self._params.subgoal_m)
+            blocked = histogram(view.pos_ne_m, near, radius_m, own.blocked, params)
+            course = best_course(_Step(view.pos_ne_m, blocked, flown, own.course_rad), target, near, radius_m, params)
+            offset = target - view.pos_ne_m
+            if course is not None and abs(_difference(course, math.atan2(*offset[::-1]))) < TOWARDS_RAD:
+                break
         return replace(own, course_rad=course, blocked=blocked, decided_t_s=view.state.t_s)
 
-    def _velocity(self, view: View, course_rad: float, near: F64) -> F64:
+    def _target(self, view: View, plan: Plan | None, ahead_m: float) -> F64:
+        return view.task.goal_ned_m if plan is None else geometry.point_at(plan.path_ne_m, plan.s_m + ahead_m)
+
+    def _velocity(self, view: View, course_rad: float, near: F64, plan: Plan | None) -> F64:
         hull_m = view.params.vehicle.radius_m
         free_m = float(free_ways(view.pos_ne_m, np.array([course_rad]), near, hull_m, self._params.window_m)[0])
         side_m = geometry.nearest_distance(view.pos_ne_m[None], near) - hull_m
@@ -140,7 +152,8 @@ class Vfh:
             turn_rad = abs(_difference(math.atan2(*view.vel_ne_m_s[::-1]), course_rad))
         speed = view.approach_m_s * fuzzy_share(free_m, side_m, turn_rad, self._params)
         wanted = speed * np.array([math.cos(course_rad), math.sin(course_rad)])
-        return barrier(wanted, near - view.pos_ne_m, hull_m, self._params)
+        kept_m = self._params.barrier_m if plan is None else min(self._params.barrier_m, plan.margin_m)
+        return barrier(wanted, near - view.pos_ne_m, hull_m + kept_m, self._params)
 
 
 def histogram(
@@ -259,18 +272,18 @@ def fuzzy_share(free_m: float, side_m: float, turn_rad: float, params: VfhParams
     return params.slow_share + (1.0 - params.slow_share) * fast
 
 
-def barrier(velocity_m_s: F64, offset_m: F64, hull_m: float, params: VfhParams) -> F64:
+def barrier(velocity_m_s: F64, offset_m: F64, kept_m: float, params: VfhParams) -> F64:
     """The velocity without what closes in on a point faster than its distance allows (a control barrier function).
 
-    Allowed towards a point at distance h from the kept distance: ``barrier_1_s`` h, and never more than stops within h;
-    where h is negative the point is moved away from. The worst point is taken out in turn.
+    Allowed towards a point that is h farther away than ``kept_m``: ``barrier_1_s`` h, never more than stops within h.
+    Where h is negative the point is moved away from. The worst point is taken out in turn.
     """
     distance = np.hypot(offset_m[:, 0], offset_m[:, 1])
-    near = distance < hull_m + 2.0
+    near = distance < kept_m + 2.0
     if not near.any():
         return velocity_m_s
     towards = offset_m[near] / np.maximum(distance[near], 1e-6)[:, None]
-    room = distance[near] - hull_m - params.barrier_m
+    room = distance[near] - kept_m
     allowed = np.minimum(params.barrier_1_s * room, [stopping_speed(m) if m > 0.0 else m for m in room.tolist()])
     for _ in range(BARRIER_ROUNDS):
         excess = towards @ velocity_m_s - allowed

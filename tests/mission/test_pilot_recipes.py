@@ -68,13 +68,13 @@ def test_the_barrier_lets_nothing_close_in_too_fast(
 ) -> None:
     offset = outside(points, 0.5)
     wanted = speed * np.array([math.cos(course), math.sin(course)])
-    let = vfh.barrier(wanted, offset, 0.33, VFH)
+    let = vfh.barrier(wanted, offset, 0.4, VFH)
     distance = np.hypot(offset[:, 0], offset[:, 1])
     closing = (offset @ let) / distance
     near = distance < 2.0
-    assert (closing[near] <= VFH.barrier_1_s * (distance[near] - 0.33 - VFH.barrier_m) + 0.05).all()
+    assert (closing[near] <= VFH.barrier_1_s * (distance[near] - 0.4) + 0.05).all()
     assert np.hypot(*let) <= speed + 1e-9
-    mirrored = vfh.barrier(wanted * EAST, offset * EAST, 0.33, VFH)
+    mirrored = vfh.barrier(wanted * EAST, offset * EAST, 0.4, VFH)
     np.testing.assert_allclose(mirrored, let * EAST, atol=1e-6)
 
 
