@@ -82,6 +82,10 @@ class Pilot:
         (bits,) = struct.unpack("<f", struct.pack("<i", value))
         self._link.send(mav.MAVLink_param_set_message(self._system, 1, name.encode(), bits, mav.MAV_PARAM_TYPE_INT32))
 
+    def set_real(self, name: str, value: float) -> None:
+        """Set a REAL32 parameter."""
+        self._link.send(mav.MAVLink_param_set_message(self._system, 1, name.encode(), value, mav.MAV_PARAM_TYPE_REAL32))
+
     def take_off(self, wall_s: float = 60.0) -> None:
         """From the ground to a hold in the air; nothing to do for a vehicle that flies. Raises FlightError."""
         self.insist(lambda: self.ready or self.armed, lambda: None, wall_s, "getting ready")

@@ -46,6 +46,7 @@ class Flier:
     def _one_leg(self, pilot: Pilot, companion: Child) -> bool:
         """From the ground to the ground; False when told to stop before."""
         pilot.take_off()
+        pilot.set_real("SIM_BAT_MIN_PCT", 80.0)  # the endurance of the software is measured
         pilot.hand_over()
         over = pilot.until(lambda: not pilot.armed or self._stop.is_set(), LEG_WALL_S)
         if self._stop.is_set():

@@ -14,9 +14,10 @@ class Battery:
     def __init__(self) -> None:
         self.remaining = 1.0
 
-    def draw(self, dt_s: float, thrust_norm: float, armed: bool) -> None:
-        """Time has passed with this much thrust."""
+    def draw(self, dt_s: float, thrust_norm: float, armed: bool, least: float = 0.0) -> None:
+        """Time has passed with this much thrust; it draws no more once only ``least`` is left."""
         if not armed:
             return
         power = max(IDLE_SHARE, (max(thrust_norm, 0.0) / HOVER_THRUST_NORM) ** POWER_EXPONENT)
-        self.remaining = max(0.0, self.remaining - power * dt_s / HOVER_ENDURANCE_S)
+        left = self.remaining - power * dt_s / HOVER_ENDURANCE_S
+        self.remaining = max(0.0, left, min(least, self.remaining))

@@ -104,6 +104,7 @@ HONOURED: Final[Mapping[str, Px4Param]] = {
         2, "", "sticks lost in a mode that needs them: 1 Hold, 2 Return, 3 Land, 5 Terminate, 6 Disarm", 1, 6
     ),
     "RTL_RETURN_ALT": Px4Param(30.0, "m", "height above home of Return; lower near home", 0),
+    "SIM_BAT_MIN_PCT": Px4Param(0.0, "%", "the simulated battery is not drawn below this", 0, 100),
     "SYS_FAILURE_EN": Px4Param(0, "", "1: failures may be injected", 0, 1),
 }
 

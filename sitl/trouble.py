@@ -37,7 +37,7 @@ class Trouble:
 
     def update(self, t_s: float, dt_s: float, truth: Truth, autopilot: Autopilot) -> None:
         """One control tick, before the autopilot's."""
-        self.battery.draw(dt_s, truth.thrust_norm, autopilot.armed)
+        self.battery.draw(dt_s, truth.thrust_norm, autopilot.armed, autopilot.params["SIM_BAT_MIN_PCT"] / 100)
         if not self.book.quiet:
             self.active = self.book.at(t_s)
             self._break_motors()
