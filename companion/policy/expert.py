@@ -32,6 +32,7 @@ class ExpertParams:
     unknown_cost: float = param(0.6, "SN_EX_UNKNOWN", "Extra cost of a cell never seen", "", 0.0, 50.0)
     hard_range_m: float = param(6.0, "SN_EX_HARD", "Hits beyond this cost, but do not block", "m", 0.5, 40.0)
     far_cost: float = param(12.0, "SN_EX_FAR", "Extra cost of a far blocked cell", "", 0.0, 200.0)
+    beyond_cost: float = param(1.0, "SN_EX_BEYOND", "Cost a metre of the way beyond the map to the goal", "", 1.0, 10.0)
     keep_ratio: float = param(1.12, "SN_EX_KEEP", "The old path stays until a new one is this much cheaper", "", 1, 3)
     length_m: float = param(8.0, "SN_EX_LENGTH", "Length of the five waypoints at most", "m", 1.0, 20.0)
     chord_m: float = param(0.06, "SN_EX_CHORD", "How far a chord may leave the path", "m", 0.01, 0.5)
@@ -43,6 +44,7 @@ class ExpertParams:
 
 BORDER_CELLS = 2  # paths to a goal outside the map end in this rim
 CHORD_RELAX = (1.0, 2.0, 4.0)
+QUARTERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 CHORD_POINTS = 20  # of the path that one chord replaces, at most
 UNREACHED = 4.0  # cost a cell from where a way ends to a goal on the map: that is approached as near as possible
 
@@ -99,6 +101,8 @@ def _field(query: Query, clearance_m: F64, hits_ne_m: F64, hard_m: float, params
     north, east = centres(grid)
     dn, de = north - query.state.pos_ned_m[0], east - query.state.pos_ned_m[1]
     square = (dn * dn)[:, None] + (de * de)[None, :]
+    if params.push_m > 0.0:
+        clearance_m = _opened(grid, clearance_m, hits_ne_m, hard_m)
     tight = clearance_m < hard_m
     near = square < params.hard_range_m**2
     cost += params.far_cost * (tight & ~near)
@@ -111,6 +115,20 @@ def _field(query: Query, clearance_m: F64, hits_ne_m: F64, hard_m: float, params
     return _Field(cost, clearance_m, hard_m, hits_ne_m)
 
 
+def _opened(grid: GridMap, clearance_m: F64, hits_ne_m: F64, hard_m: float) -> F64:
+    """Clearances, of cells that just miss ``hard_m`` the best of four places inside: gaps narrow as cells stay open."""
+    row, column = np.nonzero((clearance_m < hard_m) & (clearance_m > hard_m - 0.5 * grid.cell_m))
+    if len(row) == 0:
+        return clearance_m
+    north, east = centres(grid)
+    middle = np.stack([north[row], east[column]], axis=1)
+    places = middle[:, None, :] + grid.cell_m / 4 * QUARTERS
+    distance, _ = cKDTree(hits_ne_m).query(places.reshape(-1, 2))
+    opened = clearance_m.copy()
+    opened[row, column] = np.maximum(clearance_m[row, column], distance.reshape(-1, len(QUARTERS)).max(axis=1))
+    return opened
+
+
 def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) -> F64 | None:
     """The path to fly on, (k, 2) from the anchor; the old one unless a new one is clearly cheaper."""
     grid = query.grid
@@ -119,11 +137,12 @@ def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) ->
         source = _nearest_open(grid, field, query.prefix_ne_m[-1])
     ahead = _straight_cells(query)
     kept = _kept(query, field, old, params)
+    beyond = 1.0 if _on_map(grid, query.goal_ne_m) else params.beyond_cost
     detour = LIMIT
     if kept is not None:
-        worth = _path_cost(kept, query, field) / (params.keep_ratio * grid.cell_m)
-        detour = worth - float(ahead.ravel()[source])
-    cells = _cheapest(field.cost, source, ahead, detour) if detour > 0.0 else None
+        worth = _path_cost(kept, query, field, params, beyond) / (params.keep_ratio * grid.cell_m)
+        detour = worth - float(ahead.ravel()[source]) - (beyond - 1.0) * float(ahead.min())
+    cells = _cheapest(field.cost, source, ahead, detour, beyond) if detour > 0.0 else None
     return kept if cells is None else _smooth(_places(cells, query), query, field, params)
 
 
@@ -136,14 +155,18 @@ def _straight_cells(query: Query) -> F64:
     return straight
 
 
-def _cheapest(cost: F64, source: int, ahead: F64, detour: float) -> list[int] | None:
-    """Cells of the cheapest way off the map towards the goal, or onto it; None if it takes more than ``detour``."""
+def _cheapest(cost: F64, source: int, ahead: F64, detour: float, beyond: float) -> list[int] | None:
+    """Cells of the cheapest way off the map towards the goal, or onto it; None if it takes more than ``detour``.
+
+    ``detour`` is counted beyond the straight way, ``beyond`` is the cost of a metre from the map's rim to the goal.
+    """
     reach = reach_from(cost, source, ahead, detour)
-    inside = ahead.min() < 1.0
+    least = float(ahead.min())
+    inside = least < 1.0
     cells = np.arange(cost.size) if inside else _rim(cost.shape[0])
-    total = reach.cost[cells] + (UNREACHED if inside else 1.0) * ahead.ravel()[cells]
+    total = reach.cost[cells] + (UNREACHED if inside else beyond) * ahead.ravel()[cells]
     best = int(np.argmin(total))
-    if not total[best] < min(detour, LIMIT) + ahead.ravel()[source]:
+    if not total[best] < min(detour, LIMIT) + ahead.ravel()[source] + (beyond - 1.0) * least:
         return None
     return walk_back(reach, int(cells[best]))
 
@@ -186,16 +209,28 @@ def _kept(query: Query, field: _Field, old: F64 | None, params: ExpertParams) ->
     rest = np.concatenate([query.prefix_ne_m[-1][None], old[nearest + 1 :]])
     if not _arrives(rest, query) and (length(rest) < params.length_m or _on_map(query.grid, query.goal_ne_m)):
         return None  # it ended where the map once did, or where the goal could not be reached: look on
-    costs = _sample(query.grid, field.cost, rest)
+    costs = _fine_cost(rest, query, field, params) if params.push_m > 0.0 else _sample(query.grid, field.cost, rest)
     return None if (costs >= BLOCKED).any() else rest
 
 
-def _path_cost(path: F64, query: Query, field: _Field) -> float:
+def _path_cost(path: F64, query: Query, field: _Field, params: ExpertParams, beyond: float) -> float:
     """Cost of a path plus the straight rest to the goal, in metres."""
     step = np.hypot(*(np.diff(path, axis=0).T))
-    cost = _sample(query.grid, field.cost, (path[1:] + path[:-1]) / 2)
+    middle = (path[1:] + path[:-1]) / 2
+    fine = params.push_m > 0.0
+    cost = _fine_cost(middle, query, field, params) if fine else _sample(query.grid, field.cost, middle)
     rest = float(np.hypot(*(path[-1] - query.goal_ne_m)))
-    return float(step @ np.minimum(cost, BLOCKED)) + rest
+    return float(step @ np.minimum(cost, BLOCKED)) + beyond * rest
+
+
+def _fine_cost(places: F64, query: Query, field: _Field, params: ExpertParams) -> F64:
+    """Cost at places by their own distance to the hits, not by that of their cells; BLOCKED inside the hull."""
+    cost = np.minimum(_sample(query.grid, field.cost, places), 1.0 + params.comfort_cost + params.unknown_cost)
+    if len(field.hits_ne_m):
+        near = np.hypot(*(places - query.state.pos_ned_m[:2]).T) < params.hard_range_m
+        clearance, _ = cKDTree(field.hits_ne_m).query(places, distance_upper_bound=query.radius_m)
+        cost[near & (clearance < query.radius_m)] = BLOCKED
+    return cost
 
 
 def _smooth(path: F64, query: Query, field: _Field, params: ExpertParams) -> F64:

@@ -31,6 +31,8 @@ RUN_UP_M_S2: Final = 4.0
 RUN_UP_STEADY_S: Final = 1.5  # at speed before the start
 STANDING_M_S: Final = 0.2  # slower than this the vehicle stands: what touches it then has come by itself
 
+TOUCHING_M: Final = 0.1  # a mover this near to the hull at the end of a scan period is what touched it
+
 
 class End(StrEnum):
     """How a flight ended."""
@@ -216,8 +218,7 @@ def _fly_on(
 def _end(sim: Simulation, course: Course, began_s: float) -> End | None:
     north_m, east_m, _ = (sim.truth.pos_ned_m + sim.spawn_ned_m).tolist()
     if sim.contact:
-        speed = math.hypot(*sim.truth.vel_ned_m_s[:2].tolist())
-        return End.CONTACT if speed >= STANDING_M_S else End.STRUCK
+        return End.STRUCK if _stood_in_the_way(sim, north_m, east_m) else End.CONTACT
     if course.finished(north_m, east_m):
         return End.GOAL
     if not course.world.inside(north_m, east_m):
@@ -225,6 +226,14 @@ def _end(sim: Simulation, course: Course, began_s: float) -> End | None:
     if sim.autopilot.mode is not FlightMode.OFFBOARD:
         return End.LOST
     return End.TIMEOUT if sim.t_s - began_s >= course.rules.time_limit_s else None
+
+
+def _stood_in_the_way(sim: Simulation, north_m: float, east_m: float) -> bool:
+    """Did the vehicle stand, and is what touches it something that moves?"""
+    if math.hypot(*sim.truth.vel_ned_m_s[:2].tolist()) >= STANDING_M_S:
+        return False
+    gaps = (math.dist(m.position_ned_m(sim.world_s), (north_m, east_m)) - m.radius_m for m in sim.world.movers)
+    return min(gaps, default=math.inf) <= sim.config.radius_m + TOUCHING_M
 
 
 def _measure(log: _Log, sim: Simulation, began_s: float) -> None:
