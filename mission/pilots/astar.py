@@ -39,12 +39,12 @@ RIM_CELLS = 2  # paths to a goal outside the map end in this rim
 class AstarParams:
     """The costmap and how often it is planned on, tuned."""
 
-    margin_m: float = param(0.15, "AST_MARGIN", "Cells nearer than radius and this block", "m", 0.0, 2.0)
+    margin_m: float = param(0.2, "AST_MARGIN", "Cells nearer than radius and this block", "m", 0.0, 2.0)
     tight_m: float = param(0.02, "AST_TIGHT", "The same where there is no other way", "m", 0.0, 2.0)
     hard_range_m: float = param(3.0, "AST_HARD", "Cells farther away than this cost, but do not block", "m", 0.5, 40.0)
     far_cost: float = param(12.0, "AST_FAR", "Extra cost of those", "", 0.0, 200.0)
-    inflation: float = param(8.0, "AST_INFL", "Extra cost at the edge of what blocks", "", 0.0, 100.0)
-    decay_1_m: float = param(3.0, "AST_DECAY", "How fast that cost decays with distance", "1/m", 0.1, 20.0)
+    inflation: float = param(4.0, "AST_INFL", "Extra cost at the edge of what blocks", "", 0.0, 100.0)
+    decay_1_m: float = param(2.0, "AST_DECAY", "How fast that cost decays with distance", "1/m", 0.1, 20.0)
     period_s: float = param(0.4, "AST_PERIOD", "Time between two plans", "s", 0.05, 5.0)
     lead_s: float = param(0.4, "AST_LEAD", "A new path leaves the old one this far ahead", "s", 0.0, 2.0)
 

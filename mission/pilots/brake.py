@@ -33,7 +33,7 @@ DT_MAX_S = 0.2  # a longer gap between ticks moves the velocity no further
 class BrakeParams:
     """PX4's parameters, by PX4's names; CP_DIST was tuned."""
 
-    cp_dist_m: float = param(0.8, "CP_DIST", "Distance to keep from the centre to all obstacles", "m", 0.1, 15.0)
+    cp_dist_m: float = param(0.6, "CP_DIST", "Distance to keep from the centre to all obstacles", "m", 0.1, 15.0)
     cp_delay_s: float = param(0.4, "CP_DELAY", "Sensor and tracking delay", "s", 0.0, 1.0)
     cp_guide_deg: float = param(30.0, "CP_GUIDE_ANG", "Largest steering off the stick's direction", "deg", 0.0, 90.0)
     acc_hor_m_s2: float = param(3.0, "MPC_ACC_HOR", "Acceleration of a full stick", "m/s2", 0.1, 15.0)

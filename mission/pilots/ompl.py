@@ -35,7 +35,7 @@ BACK_M = 1.0  # farther off its path than this it plans again
 class OmplParams:
     """What the oracle may choose, tuned."""
 
-    margin_m: float = param(0.2, "OMPL_MARGIN", "Planned clearance beyond the radius", "m", 0.0, 2.0)
+    margin_m: float = param(0.3, "OMPL_MARGIN", "Planned clearance beyond the radius", "m", 0.0, 2.0)
 
 
 @dataclass(frozen=True, slots=True)
