@@ -58,6 +58,7 @@ class EnvConfig:
     time_limit_s: float = 90.0  # from the hand-over
     discount_per_s: float = 0.98
     until: Until = "above"  # see ``episode``
+    low_level: bool = False  # who trains makes ``SwiftNavLowLevel-v0`` of it: the policy steers by itself
     params: dict[str, dict[str, Any]] = field(default_factory=dict)  # overrides of the navigator's, by group
 
     def __post_init__(self) -> None:

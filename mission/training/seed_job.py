@@ -22,6 +22,7 @@ from mission.training.env_config import flight_spec, navigator_params
 from mission.training.evaluate import fly_plan
 from mission.training.exploration import Exploration
 from mission.training.fleet import Member, OnUpdate, run_fleet
+from mission.training.low_level import SwiftNavLowLevelEnv
 from mission.training.metrics import Row
 from mission.training.mirror import half_mirrored
 from mission.training.parts import F32, Parts
@@ -47,11 +48,11 @@ class SeedJob:
     spec: RunSpec
 
     def __call__(self, seed: int, folder: Path) -> Iterator[Status]:
-        """Train in ``folder`` from where it stands; leaves a policy there that can fly."""
+        """Train in ``folder`` from where it stands; leaves a policy there that can fly, unless it steers."""
         learner, parts = assemble(self.spec, seed)
         trainer = Trainer(parts, self.spec.preset.training, self.spec.until, seed, folder)
         for status in trainer.run():
-            if status.state == "done":
+            if status.state == "done" and not self.spec.preset.env.low_level:
                 save_policy(folder / POLICY_FOLDER, learner.actor(), _card(self.spec, seed, status))
             yield status
 
@@ -68,21 +69,30 @@ def train_fleet(spec: RunSpec, folder: Path, jobs: int, cluster: str | None, on_
 
 def check(spec: RunSpec) -> None:
     """Raises InputError or ParamError about what cannot be trained, before any process starts."""
-    SwiftNavEnv(spec.world, spec.preset.env)
+    environment(spec)
     try:
         torch.empty(1, device=spec.device)
     except (RuntimeError, AssertionError) as error:
         raise InputError(f"--device '{spec.device}': {str(error).splitlines()[0]}") from error
-    if spec.preset.training.prefill_flights and spec.preset.env.decoder != "detour":
+    training = spec.preset.training
+    if spec.preset.env.low_level and (training.mirror or training.prefill_flights):
+        raise InputError("training.mirror and training.prefill_flights are for paths: not with env.low_level")
+    if training.prefill_flights and spec.preset.env.decoder != "detour":
         raise InputError(
             "training.prefill_flights needs the decoder 'detour': no other action says what the expert does"
         )
 
 
+def environment(spec: RunSpec) -> SwiftNavEnv | SwiftNavLowLevelEnv:
+    """What the policy learns in. Raises InputError or ParamError."""
+    kind = SwiftNavLowLevelEnv if spec.preset.env.low_level else SwiftNavEnv
+    return kind(spec.world, spec.preset.env)
+
+
 def assemble(spec: RunSpec, seed: int) -> tuple[TD3, Parts]:
     """One seed, ready to train. Each part draws from a child of the seed, so none moves another's draws."""
     preset = spec.preset
-    env = SwiftNavEnv(spec.world, preset.env)
+    env = environment(spec)
     obs_dim, action_dim = env.observation_space.shape[0], env.action_space.shape[0]
     draws = [int(child.generate_state(1)[0]) for child in np.random.SeedSequence([seed, 0, 0]).spawn(3)]
     learner = TD3(obs_dim, action_dim, replace(preset.td3, device=spec.device), draws[0])
@@ -93,9 +103,9 @@ def assemble(spec: RunSpec, seed: int) -> tuple[TD3, Parts]:
         learner,
         memory,
         explorer,
-        evaluate=_Evaluation(spec, seed, learner),
+        evaluate=None if preset.env.low_level else _Evaluation(spec, seed, learner),
         mirror=_mirror(spec) if preset.training.mirror else None,
-        teacher=_Teacher(env) if preset.training.prefill_flights else None,
+        teacher=_Teacher(env) if preset.training.prefill_flights and isinstance(env, SwiftNavEnv) else None,
         physics_s=lambda: env.physics_s,
     )
     return learner, parts

@@ -6,6 +6,7 @@ checkpoint, with the same outcome, and ends with the weights of a run that was n
 """
 
 import json
+import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
@@ -49,8 +50,9 @@ class Trainer:
     @property
     def finished(self) -> bool:
         """Nothing is left to do."""
-        enough = self.progress.successes >= self._until.successes
-        return enough or self.progress.episodes >= self._until.episodes
+        progress, until = self.progress, self._until
+        enough = progress.successes >= until.successes
+        return enough or progress.episodes >= until.episodes or progress.ticks >= until.ticks
 
     def run(self) -> Iterator[Status]:
         """Train to the end. Raises FlightError where a checkpoint cannot be written."""
@@ -215,6 +217,9 @@ class Trainer:
         if not self.progress.episodes:
             return None
         left = self._until.episodes - self.progress.episodes
+        if self.progress.ticks:
+            per_episode = self.progress.ticks / self.progress.episodes
+            left = min(left, math.ceil((self._until.ticks - self.progress.ticks) / per_episode))
         if rate > 0.0:
             left = min(left, round((self._until.successes - self.progress.successes) / rate))
         return left * wall_s / self.progress.episodes

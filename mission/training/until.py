@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass, fields
 
+UNLIMITED = 10**12
+
 
 @dataclass(frozen=True, slots=True)
 class Until:
-    """Training ends with so many successes, or so many episodes."""
+    """Training ends with so many successes, so many episodes, or the episode in which the ticks are used up."""
 
     successes: int = 100
     episodes: int = 1000
+    ticks: int = UNLIMITED  # of the environment
 
     def __post_init__(self) -> None:
         _at_least(self, 1, [field.name for field in fields(self)])

@@ -39,7 +39,8 @@ class Pendulum(gymnasium.Wrapper[F32, F32, F32, F32]):
         info: dict[str, Any] = {"entered": False, "discount": 0.98}
         if self._steps == STEPS:
             success = self._total > -60.0
-            info["episode"] = {"success": success, "steps": STEPS, "return": self._total, "track_ne_m": [[0.0, 1.0]]}
+            counts = {"steps": STEPS, "ticks": STEPS}
+            info["episode"] = {"success": success, **counts, "return": self._total, "track_ne_m": [[0.0, 1.0]]}
         return obs, float(reward), False, self._steps == STEPS, info
 
 

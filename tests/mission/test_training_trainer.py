@@ -94,6 +94,12 @@ def test_training_ends_with_its_successes(tmp_path: Path) -> None:
     assert [status.progress for status in again] == [statuses[-1].progress]
 
 
+def test_training_ends_with_the_episode_that_uses_up_the_ticks(tmp_path: Path) -> None:
+    statuses = list(Trainer(parts(5), CONFIG, Until(1000, 1000, ticks=2 * STEPS + 1), 5, tmp_path).run())
+    assert [status.progress.episodes for status in statuses] == [1, 2, 3]
+    assert [status.time_left_s == 0.0 for status in statuses] == [False, False, True]
+
+
 def test_a_damaged_checkpoint_is_told_and_the_one_before_it_counts(tmp_path: Path) -> None:
     _train(tmp_path / "whole")
     _train(tmp_path / "damaged", 9)
