@@ -42,6 +42,9 @@ class MapParams:
     )
     forget_s: float = param(90.0, "SN_MAP_FORGET", "A hit not seen again is dropped after this time", "s", 1.0, 3600)
     noise_m: float = param(0.03, "SN_MAP_NOISE", "Range error the certified wedge keeps clear of", "m", 0.0, 0.5)
+    blend: float = param(
+        1.0, "SN_MAP_BLEND", "Weight of a new hit in a cell that holds one (1: the newest)", "", 0.05, 1
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,8 +213,11 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     whole = (np.bincount(sector, possible) == 0.0).take(sector)
     paint = inside & (possible | whole)
     cells = flat.compress(paint)
+    weight = (
+        np.where(hit_t.take(cells) > NEVER, np.float32(params.blend), np.float32(1.0)) if params.blend < 1.0 else None
+    )
     hit_t.ravel()[cells] = scan.t_s
-    _place(hit_ne_m, cells, points.compress(paint, axis=0))
+    _place(hit_ne_m, cells, points.compress(paint, axis=0), weight)
     if not whole.any():
         return np.empty((0, 2))
     behind, there = cells_of(grid, points + direction * grid.cell_m)
@@ -223,14 +229,19 @@ def _paint(grid: GridMap, free_t: F32, hit_t: F32, hit_ne_m: F32, scan: PolarSca
     return np.stack(middle, axis=1)
 
 
-def _place(hit_ne_m: F32, cells: Index, points_ne_m: F64) -> None:
-    """Write the hits of one scan; of several in one cell the middle of first and last, so that left equals right."""
+def _place(hit_ne_m: F32, cells: Index, points_ne_m: F64, weight: F32 | None) -> None:
+    """Write the hits of one scan; of several in one cell the middle of first and last, so that left equals right.
+
+    ``weight`` of each against what its cell holds already: range noise averages out; None: nothing of that stays.
+    """
     stored = hit_ne_m.reshape(-1).view(np.complex64)  # north and east as one number: a third of the time
+    before = None if weight is None else stored.take(cells)
     points = points_ne_m.astype(np.float32).reshape(-1).view(np.complex64)
     stored[cells[::-1]] = points[::-1]
     first = stored.take(cells)
     stored[cells] = points
-    stored[cells] = (first + stored.take(cells)) * np.float32(0.5)
+    middle = (first + stored.take(cells)) * np.float32(0.5)
+    stored[cells] = middle if before is None or weight is None else before + (middle - before) * weight
 
 
 def _window(n: int, i: int, j: int, radius: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:

@@ -41,6 +41,7 @@ class Entry:
             "pilot": self.pilot,
             "profile": self.profile,
             "stress": self.stress,
+            "profile_params": profile_named(self.profile) if self.profile is not None else {},
             "params": self.overrides,
             "px4_params": self.px4_params,
         }
