@@ -108,6 +108,8 @@ def soak(given: argparse.Namespace, folder: Path) -> dict[str, Any]:
         legs = sum(future.result() for future in flying)
     rates = LEAN_HZ if lockstep else ONBOARD_HZ
     quiet = {mav.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS}  # in its own mode only
+    if lockstep:  # also sent whenever they change
+        quiet |= {mav.MAVLINK_MSG_ID_HEARTBEAT, mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE}
     figures = summary(memories, [e.traffic for e in ears], {i: hz for i, hz in rates.items() if i not in quiet})
     return {**_asked(given), "legs": legs, **figures}
 

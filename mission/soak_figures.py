@@ -1,6 +1,7 @@
 """What do memory, rates and speed do in the long run? Samples in, figures out; wall time; pure but for one ``ps``."""
 
 import statistics
+import math
 import subprocess
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -49,8 +50,11 @@ class Traffic:
         (wall_s, vehicle_s), (wall_end_s, vehicle_end_s) = self.clock[0], self.clock[-1]
         return (vehicle_end_s - vehicle_s) / (wall_end_s - wall_s)
 
-    def rates(self) -> dict[int, tuple[float, float, float]]:
-        """By id: mean rate, and that of the first and of the second half of the windows; Hz of wall time."""
+    def rates(self) -> dict[int, tuple[float, float]]:
+        """By id: mean rate in Hz of wall time, and by which share it rose from the first half of the windows on.
+
+        A message more or less in one half is not counted: it is where the window was cut.
+        """
         half = len(self.windows) // 2
         parts = (self.windows, self.windows[:half], self.windows[half:])
         ids = sorted({i for _, counts in self.windows for i, n in counts.items()})
@@ -58,7 +62,9 @@ class Traffic:
         for message_id in ids:
             if sum(counts[message_id] for _, counts in self.windows) >= COUNTS_MIN:
                 whole, first, second = (_rate(part, message_id) for part in parts)
-                found[message_id] = (whole, first, second)
+                one_hz = _rate([(sum(length for length, _ in parts[1]), Counter({message_id: 1}))], message_id)
+                rise = math.copysign(max(abs(second - first) - one_hz, 0.0), second - first)
+                found[message_id] = (whole, rise / first if first > 0.0 else 0.0)
         return found
 
 
@@ -117,8 +123,8 @@ def _stream(message_id: int, traffics: Sequence[Traffic], asked_hz: float) -> di
     found = [rates[message_id] for traffic in traffics if message_id in (rates := traffic.rates())]
     if not found:
         return None
-    whole, _, _ = max(found, key=lambda rates: abs(rates[0] - asked_hz))
-    drift = max((b / a - 1.0 for _, a, b in found if a > 0.0), key=abs, default=0.0)
+    whole, _ = max(found, key=lambda rates: abs(rates[0] - asked_hz))
+    drift = max((drift for _, drift in found), key=abs)
     error, kind = whole / asked_hz - 1.0, mav.mavlink_map.get(message_id)
     name = kind.msgname if kind is not None else "CURRENT_MODE" if message_id == CURRENT_MODE_ID else str(message_id)
     return {"message": name, "asked_hz": asked_hz, "hz": whole, "error": error, "drift": drift}
