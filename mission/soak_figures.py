@@ -1,7 +1,7 @@
 """What do memory, rates and speed do in the long run? Samples in, figures out; wall time; pure but for one ``ps``."""
 
-import statistics
 import math
+import statistics
 import subprocess
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
