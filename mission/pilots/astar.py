@@ -39,10 +39,11 @@ RIM_CELLS = 2  # paths to a goal outside the map end in this rim
 class AstarParams:
     """The costmap and how often it is planned on, tuned."""
 
-    margin_m: float = param(0.2, "AST_MARGIN", "Cells nearer than radius and this block", "m", 0.0, 2.0)
-    tight_m: float = param(0.02, "AST_TIGHT", "The same where there is no other way", "m", 0.0, 2.0)
+    margin_m: float = param(0.2, "AST_MARGIN", "Cells nearer than radius and this are dear", "m", 0.0, 2.0)
+    squeeze: float = param(4.0, "AST_SQUEEZE", "Extra cost of those", "", 0.0, 100.0)
+    tight_m: float = param(0.02, "AST_TIGHT", "Cells nearer than radius and this block", "m", 0.0, 2.0)
     hard_range_m: float = param(3.0, "AST_HARD", "Cells farther away than this cost, but do not block", "m", 0.5, 40.0)
-    far_cost: float = param(12.0, "AST_FAR", "Extra cost of those", "", 0.0, 200.0)
+    far_cost: float = param(12.0, "AST_FAR", "Extra cost of such cells", "", 0.0, 200.0)
     inflation: float = param(4.0, "AST_INFL", "Extra cost at the edge of what blocks", "", 0.0, 100.0)
     decay_1_m: float = param(2.0, "AST_DECAY", "How fast that cost decays with distance", "1/m", 0.1, 20.0)
     period_s: float = param(0.4, "AST_PERIOD", "Time between two plans", "s", 0.05, 5.0)
@@ -115,13 +116,22 @@ def replan(view: View, old: Plan | None, params: AstarParams) -> Plan | None:
     clearance_m = clearance_field(grid, occupied(grid, view.state.t_s, view.params.map))
     _swept(clearance_m, grid, view)
     prefix = committed(view, old, params.lead_s)
-    for margin_m in (params.margin_m, params.tight_m, params.tight_m - grid.cell_m / 2):
-        costmap = costmap_of(view, clearance_m, view.params.vehicle.radius_m + margin_m, params)
+    for hard_m in (params.tight_m, params.tight_m - grid.cell_m / 2):
+        costmap = costmap_of(view, clearance_m, view.params.vehicle.radius_m + hard_m, params)
         for begin in (prefix, prefix[:1]) if len(prefix) > 1 else (prefix,):
             path = cheapest_path(view, begin[-1], costmap)
             if path is not None:
-                return Plan(np.concatenate([begin[:-1], path]), 0.0, view.state.t_s, max(margin_m, 0.0))
+                path = np.concatenate([begin[:-1], path])
+                return Plan(path, 0.0, view.state.t_s, _room(path, view, params))
     return None
+
+
+def _room(path: F64, view: View, params: AstarParams) -> float:
+    """Clearance of the next stretch of a path beyond the radius, from 0 to ``margin_m``."""
+    stretch = geometry.part(path, 0.0, params.hard_range_m)
+    reach_m = view.params.vehicle.radius_m + params.margin_m
+    nearest_m = geometry.nearest_distance(stretch, view.percept.points_ne_m, reach_m)
+    return min(max(nearest_m - view.params.vehicle.radius_m, 0.0), params.margin_m)
 
 
 def committed(view: View, old: Plan | None, lead_s: float) -> F64:
@@ -164,7 +174,9 @@ def costmap_of(view: View, clearance_m: F64, hard_m: float, params: AstarParams)
     A vehicle that is already nearer than it should be may leave through cells no nearer than its own, up to LEAVE_M.
     """
     grid = view.percept.grid
-    cost: F64 = 1.0 + params.inflation * np.exp(-params.decay_1_m * np.maximum(clearance_m - hard_m, 0.0))
+    dear_m = view.params.vehicle.radius_m + params.margin_m
+    cost: F64 = 1.0 + params.inflation * np.exp(-params.decay_1_m * np.maximum(clearance_m - dear_m, 0.0))
+    cost += params.squeeze * (clearance_m < dear_m)
     blocked = clearance_m < hard_m
     here_m = float(clearance_m.ravel()[_cell(grid, view.pos_ne_m)])
     north, east = centres(grid)
