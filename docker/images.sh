@@ -32,14 +32,15 @@ choose_engine() {
 
 b() { buildah --root "$WORK/store" --runroot "$WORK/run" "$@"; }
 
-# A Debian as small as the slim image, that trusts whom this machine trusts (a registry mirror's certificate, say).
+# A Debian as small as the slim image, that trusts whom this machine trusts (a mirror's certificate, say).
 make_base() {
     BASE=localhost/debian:bookworm
     if b images -q "$BASE" >/dev/null 2>&1; then return; fi
     say "base: Debian 12 by debootstrap"
     rm -rf "$WORK/base"
+    # DEBIAN_MIRROR: where packages come from, if not where debootstrap looks by itself.
     debootstrap --variant=minbase --include=ca-certificates bookworm "$WORK/base" \
-        "${DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$WORK/debootstrap.log"
+        ${DEBIAN_MIRROR:+"$DEBIAN_MIRROR"} >"$WORK/debootstrap.log"
     cp /etc/ssl/certs/ca-certificates.crt "$WORK/base/etc/ssl/certs/"
     chroot "$WORK/base" apt-get clean
     for left_over in var/lib/apt/lists usr/share/doc usr/share/man usr/share/locale usr/share/info; do
@@ -52,12 +53,14 @@ make_base() {
     rm -rf "$WORK/base"
 }
 
+# build IMAGE [DOCKERFILE [ARGUMENT]]
 build() {
     say "build swiftnav-$1"
     if [ "$ENGINE" = buildah ]; then
-        b bud -q --format docker --build-arg BASE="$BASE" -f "docker/$1.Dockerfile" -t "swiftnav-$1" .
+        b bud -q --format docker --build-arg BASE="$BASE" ${3:+--build-arg "$3"} \
+            -f "docker/${2:-$1}.Dockerfile" -t "swiftnav-$1" .
     else
-        "$ENGINE" build -q -f "docker/$1.Dockerfile" -t "swiftnav-$1" .
+        "$ENGINE" build -q ${3:+--build-arg "$3"} -f "docker/${2:-$1}.Dockerfile" -t "swiftnav-$1" .
     fi
 }
 
@@ -113,6 +116,12 @@ try_others() {
     else
         "$ENGINE" run --rm swiftnav-sitl fly trajectory1
     fi
+    say "train: one short episode"
+    if [ "$ENGINE" = buildah ]; then
+        b run "$(container_of train)" -- swiftnav train --world trajectory1 --seeds 1 --max-episodes 1 --set training.evaluate_every=0
+    else
+        "$ENGINE" run --rm swiftnav-train train --world trajectory1 --seeds 1 --max-episodes 1 --set training.evaluate_every=0
+    fi
     say "relay: has what it starts"
     if [ "$ENGINE" = buildah ]; then
         run relay "$WORK" socat -V | head -2
@@ -125,6 +134,7 @@ choose_engine
 say "with $ENGINE"
 if [ "${1:-build}" = build ]; then
     for image in companion sitl relay; do build "$image"; done
+    build train sitl EXTRA=train
 fi
 if [ "${1:-try}" = try ]; then
     try_companion

@@ -1,8 +1,11 @@
 # The vehicle and whatever flies it on a desk: JSBSim, LiDAR, flight stack, operator, companion, missions.
-# linux/amd64 only: JSBSim has no other Linux wheel. BASE: any Debian 12. See docker/README.md.
+# linux/amd64 only: JSBSim has no other Linux wheel. BASE: any Debian 12. EXTRA=train: what training needs besides.
+# See docker/README.md.
 ARG BASE=debian:bookworm-slim
+ARG EXTRA=sitl
 
 FROM ${BASE} AS build
+ARG EXTRA
 # Versions are Debian stable's, which only changes for security.
 # hadolint ignore=DL3008
 RUN apt-get update \
@@ -12,7 +15,7 @@ WORKDIR /src
 RUN python3 -m venv /venv
 COPY pyproject.toml constraints.txt README.md LICENSE docker/requirements.py ./
 # The libraries first: they change less often than our own code.
-RUN python3 requirements.py pyproject.toml sitl > requirements.txt \
+RUN python3 requirements.py pyproject.toml "${EXTRA}" > requirements.txt \
     && /venv/bin/pip install --no-cache-dir --only-binary :all: -c constraints.txt -r requirements.txt
 COPY companion companion
 COPY sitl sitl
