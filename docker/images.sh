@@ -116,11 +116,13 @@ try_others() {
     else
         "$ENGINE" run --rm swiftnav-sitl fly trajectory1
     fi
-    say "train: one short episode"
+    say "train: one episode"
+    episode="train --world trajectory1 --seeds 1 --max-episodes 1 --set training.evaluate_every=0"
+    # shellcheck disable=SC2086 # words
     if [ "$ENGINE" = buildah ]; then
-        b run "$(container_of train)" -- swiftnav train --world trajectory1 --seeds 1 --max-episodes 1 --set training.evaluate_every=0
+        b run "$(container_of train)" -- swiftnav $episode
     else
-        "$ENGINE" run --rm swiftnav-train train --world trajectory1 --seeds 1 --max-episodes 1 --set training.evaluate_every=0
+        "$ENGINE" run --rm swiftnav-train $episode
     fi
     say "relay: has what it starts"
     if [ "$ENGINE" = buildah ]; then
