@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from mission.bench.entry import Entry
 from mission.bench.rows import Row, barn_log
 from mission.bench.scores import CLIP_05, barn_score, by_cell, summary
 
 LOG = "barn.log"
+HEADS = ("cell", "runs", "success [95 %]", "contact", "struck", "timeout", "SPL", "time s", "score .5 / .25", "least m")
 
 
 def figures_of(suite: str, entry: Entry, rows: Sequence[Row], skipped: int = 0) -> dict[str, Any]:
@@ -39,12 +39,12 @@ def write_log(folder: Path, rows: Sequence[Row]) -> None:
 def print_figures(figures: dict[str, Any], console: Console) -> None:
     """A line for each cell, one for all of them, and the failures."""
     entry = " ".join(str(figures[key]) for key in ("pilot", "profile", "stress") if figures[key] not in (None, "none"))
-    table = Table(title=f"{figures['suite']}, {entry}", title_justify="left")
-    for column in ("cell", "runs", "success", "contact", "struck", "timeout", "SPL", "time", "score", "clearance"):
-        table.add_column(column, justify="left" if column == "cell" else "right")
-    for name, cell in [*figures["cells"].items(), ("all", figures)]:
-        table.add_row(name, *_line(cell))
-    console.print(table)
+    rows = [HEADS, *((name, *_line(cell)) for name, cell in [*figures["cells"].items(), ("all", figures)])]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(HEADS))]
+    console.print(f"{figures['suite']}, {entry}", markup=False)
+    for row in rows:
+        line = "  ".join(word.rjust(width) for word, width in zip(row, widths, strict=True))
+        console.print(line, markup=False, soft_wrap=True)
     for failure in figures["failures"]:
         console.print(f"  {failure['world']}, run {failure['run']}: {failure['end']}", markup=False)
 
