@@ -5,13 +5,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mission.cli_options import Json, print_json, require_extra
-from mission.errors import InputError
+from mission.cli_options import Json, parse_switch, print_json, require_extra
 
 if TYPE_CHECKING:
     from mission.training.scores import FlightFigures
 
-SWITCH = {"on": True, "off": False}
 RATES = ("success", "contact", "timeout")
 SUMMED_UP = (
     ("spl", "success weighted by path length"),
@@ -51,18 +49,17 @@ def evaluate(
 ) -> None:
     """Fly a policy greedily over whole missions in process, judge every flight, sum up with 95 % Wilson intervals."""
     require_extra("sitl", "eval")
-    if guard not in SWITCH:
-        raise InputError(f"--guard '{guard}' wants on or off")
+    guarded = parse_switch(guard, "--guard")
     from mission.training.baselines import policy_for
     from mission.training.evaluate import EvalSpec, fly_many
     from mission.training.flights import plan_in
     from mission.training.scores import summary
 
-    spec = EvalSpec(policy, world, SWITCH[guard])
+    spec = EvalSpec(policy, world, guarded)
     plan = plan_in(world, seed, spec.overrides())
     policy_for(policy, plan.params, seed)  # mistakes are told before anything flies
     flights = _shown(fly_many(spec, range(seed, seed + episodes), jobs), episodes, f"{policy} in {world}", json)
-    settings = {"policy": policy, "world": world, "guard": SWITCH[guard], "seed": seed}
+    settings = {"policy": policy, "world": world, "guard": guarded, "seed": seed}
     figures = {**settings, **summary(flights)}
     if json:
         print_json(figures)

@@ -19,6 +19,7 @@ from mission.cli_options import (
     parse_firmware,
     parse_overrides,
     parse_speed,
+    parse_switch,
     print_json,
     require_extra,
 )
@@ -32,7 +33,13 @@ FlySpeed = Annotated[
 ]
 
 World = Annotated[str | None, typer.Option(help="Fly in this world (a name or a YAML file) instead of the mission's.")]
-Policy = Annotated[str | None, typer.Option(help="Who proposes waypoints in RL mode, instead of the mission's.")]
+Policy = Annotated[
+    str | None,
+    typer.Option(help="Who flies in RL mode, instead of the mission's: geometric, a shipped name, a folder."),
+]
+Guard = Annotated[
+    str | None, typer.Option(help="on: a learned policy only where the expert knows no better; off: it flies alone.")
+]
 OperatorUrl = Annotated[str | None, typer.Option(help="Link of the operator, instead of udpin port 14030.")]
 Out = Annotated[Path | None, typer.Option("--out", help="Flight folder, new or empty; default below ./flights.")]
 MissionName = Annotated[str, typer.Argument(help="A mission's name, a YAML file, or a QGroundControl .plan.")]
@@ -45,6 +52,7 @@ def fly(
     lockstep: Lockstep = False,
     world: World = None,
     policy: Policy = None,
+    guard: Guard = None,
     param: ParamSet = None,
     params: ParamFile = None,
     fault: Faults = None,
@@ -68,12 +76,15 @@ def fly(
     who, px4 = parse_firmware(firmware, px4_bin)
     times, in_step = parse_speed(speed or DEFAULT_SPEED[who.value], lockstep)
     settings = FlySettings(times, in_step, instance, operator_url, who, px4, sign_key)
-    plan = plan_flight(mission, seed, parse_overrides(params, param), world, policy, fault or ())
+    overrides = parse_overrides(params, param)
+    if guard is not None:
+        overrides["policy"] = {**(overrides.get("policy") or {}), "guard": parse_switch(guard, "--guard")}
+    plan = plan_flight(mission, seed, overrides, world, policy, fault or ())
     if who.value == "px4":
         plan = with_gps_tolerance(plan)
     check_ports(instance, who)
     folder = make_folder(plan, out)
-    title = f"{plan.mission.name}, seed {seed}, {plan.mission.policy}"
+    title = f"{plan.mission.name}, seed {seed}, {plan.params.policy.name}"
     with FlightConsole(title, LogTail(folder / "navigator.jsonl"), quiet=json) as console:
         result = run(plan, settings, folder, console)
     if json:

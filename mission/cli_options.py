@@ -20,6 +20,7 @@ EXTRA_MODULES = {  # as pyproject.toml lists them
     "train": ("jsbsim", "matplotlib", "torch", "gymnasium", "tensorboard", "onnx"),
     "scale": ("ray",),
 }
+SWITCH = {"on": True, "off": False}
 SPEED_MIN, SPEED_MAX = 0.1, 100.0
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines.")]
@@ -50,6 +51,13 @@ def require_extra(extra: str, command: str) -> None:
     """Raise InputError with the line that says what to install, when a package of the extra is missing."""
     if any(importlib.util.find_spec(module) is None for module in EXTRA_MODULES[extra]):
         raise InputError(f"swiftnav {command} needs the '{extra}' extra: pip install 'swiftnav[{extra}]'")
+
+
+def parse_switch(text: str, option: str) -> bool:
+    """On or off. Raises InputError."""
+    if text not in SWITCH:
+        raise InputError(f"{option} '{text}' wants on or off")
+    return SWITCH[text]
 
 
 def parse_speed(text: str, lockstep: bool) -> tuple[float, bool]:

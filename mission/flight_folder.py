@@ -62,6 +62,9 @@ def versions(plan: FlightPlan, settings: dict[str, Any]) -> dict[str, Any]:
         "sim_seed": draws.sim_seed,
         "mover_seed": draws.mover_seed,
         "world_sha256": world_hash(plan.world),
+        "policy": plan.params.policy.name,
+        "policy_sha256": plan.policy_sha256(),
+        "guard": plan.params.policy.guard,
         "settings": settings,
     }
 

@@ -15,7 +15,10 @@ from companion.core import params as core_params
 from companion.core.params import ParamError
 from companion.core.task import Task
 from companion.core.types import F64
+from companion.navigator.decide import policy_named
 from companion.navigator.params import Params
+from companion.policy.expert import GeometricExpert
+from companion.policy.store import digest_of
 from mission.errors import InputError
 from mission.mission_file import ForestSpec, Mission, load_mission
 from mission.strict_yaml import checked
@@ -51,6 +54,11 @@ class FlightPlan:
     draws: Draws
     task: Task  # local ned
 
+    def policy_sha256(self) -> str | None:
+        """Of the weights of the policy that flies; None for the expert, which has none."""
+        name = self.params.policy.name
+        return None if name == GeometricExpert.name else digest_of(name)
+
 
 def plan_flight(
     name_or_path: str,
@@ -69,7 +77,9 @@ def plan_flight(
     if faults:
         more = {"faults": (*mission.faults, *faults)}
         mission = checked(Mission, {**mission.model_dump(), **more}, "--fault")
-    return plan_mission(mission, seed, overrides)
+    plan = plan_mission(mission, seed, overrides)
+    policy_named(plan.params.policy.name, plan.params)  # what does not fit is told before anything flies
+    return plan
 
 
 def plan_mission(mission: Mission, seed: int, overrides: dict[str, dict[str, Any]] | None = None) -> FlightPlan:

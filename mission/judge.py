@@ -42,6 +42,7 @@ class Result:
     seed: int
     world: str
     policy: str
+    policy_sha256: str | None = None  # of its weights
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready."""
@@ -87,7 +88,8 @@ def judge(plan: FlightPlan, folder: Path, trouble: str | None) -> Result:
         log_dir=str(folder),
         seed=plan.seed,
         world=plan.world.name,
-        policy=plan.mission.policy,
+        policy=plan.params.policy.name,
+        policy_sha256=plan.policy_sha256(),
     )
 
 

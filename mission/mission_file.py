@@ -10,13 +10,14 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, Strict, field_validator, model_validator
 
 from companion.core.params import nearest
+from companion.policy.expert import GeometricExpert
+from companion.policy.store import is_folder, shipped
 from mission.errors import InputError
 from mission.plan_file import read_plan
 from mission.strict_yaml import StrictModel, checked, read_yaml
 from sitl.faults import parse
 
 Real = Annotated[float, Strict()]
-POLICIES = ("geometric",)
 TIME_LIMIT_MAX_S = 3600.0
 Turbulence = Literal["none", "light", "moderate", "severe"]
 
@@ -80,7 +81,7 @@ class Mission(StrictModel):
     wind: WindSpec = WindSpec()
     noise: NoiseSpec = NoiseSpec()
     faults: tuple[str, ...] = ()  # NAME[=VALUE][@START[..END]], see sitl.faults
-    policy: str = "geometric"
+    policy: str = GeometricExpert.name  # or a shipped one, or the folder of one
     success: Success
     params: dict[str, dict[str, Any]] = Field(default_factory=dict)
 
@@ -100,8 +101,9 @@ class Mission(StrictModel):
     @field_validator("policy")
     @classmethod
     def _known_policy(cls, name: str) -> str:
-        if name not in POLICIES:
-            raise ValueError(f"unknown policy{nearest(name, list(POLICIES))}")
+        known = [GeometricExpert.name, *shipped()]
+        if not is_folder(name) and name not in known:
+            raise ValueError(f"unknown policy{nearest(name, known)}")
         return name
 
 

@@ -75,6 +75,11 @@ def folder_of(policy: str | Path) -> Path:
     return POLICIES / policy
 
 
+def digest_of(policy: str | Path) -> str:
+    """sha256 of the weights of a policy that was read without complaint. Raises PolicyError."""
+    return hashlib.sha256(_bytes(folder_of(policy) / ACTOR)).hexdigest()
+
+
 def read_policy(folder: Path) -> tuple[Card, Actor]:
     """Card and actor from a folder, everything checked. Raises PolicyError."""
     data, weights = _json(folder / CARD), _bytes(folder / ACTOR)
