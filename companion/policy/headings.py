@@ -14,6 +14,7 @@ from companion.policy.interface import Proposal, Query
 
 HEADINGS = 41
 NEXT_CHOICES = 13  # behind the best
+LASTS_S = 0.8  # a straight path is replaced after this long: at 0.4 s flights were as long, at 3 s a tenth longer
 SHORTEST_M = 1.0  # chord of a teacher's path that its heading is read from, at least
 STEP_M = 0.25
 
@@ -30,7 +31,7 @@ def ranked(logits: F64, query: Query, params: DecoderParams) -> tuple[Proposal, 
     best = refined(logits, order[0], headings)
     paths = [arc(heading, 0.0, params.headings_m, query, params) for heading in (best, *headings[order[1:]].tolist())]
     first, *others = (joined(query, path) for path in paths)
-    return Proposal(first, tuple(others)), best
+    return Proposal(first, tuple(others), LASTS_S), best
 
 
 def refined(logits: F64, best: int, headings: F64) -> float:

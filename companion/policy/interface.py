@@ -28,10 +28,12 @@ class Proposal:
     """Waypoints in local NED, (k, 2): the committed stretch if there is one, then five new ones (fewer near the goal).
 
     ``others_ne_m`` are next choices, best first: where the checker does not keep the first, it is asked about these.
+    ``lasts_s``: the policy wants to be asked again after so long; None: as the parameters have it.
     """
 
     waypoints_ne_m: F64
     others_ne_m: tuple[F64, ...] = ()
+    lasts_s: float | None = None
 
 
 class Policy(Protocol):
