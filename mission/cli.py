@@ -10,6 +10,7 @@ import typer
 
 from companion.core.params import ParamError
 from mission.cli_bench import app as bench_app
+from mission.cli_clone import clone
 from mission.cli_eval import evaluate, export
 from mission.cli_fly import fly
 from mission.cli_params import app as params_app
@@ -33,6 +34,7 @@ app = typer.Typer(
 app.command(epilog="Example: swiftnav fly trajectory2 --seed 7 --json")(fly)
 app.command(epilog="Example: swiftnav sitl --world trajectory1 --speed 1")(sitl)
 app.command(epilog="Example: swiftnav train --world trajectory1 --seeds 5 --until-successes 100")(train)
+app.command(epilog="Example: swiftnav clone --world mixed:train --rounds 5 --flights 40 --out runs/forest")(clone)
 app.command("eval", epilog="Example: swiftnav eval geometric --world barrier --episodes 60 --json")(evaluate)
 app.command(epilog="Example: swiftnav export trajectory2 --onnx trajectory2.onnx")(export)
 app.add_typer(worlds_app, name="worlds")

@@ -7,7 +7,7 @@ taken. Start at the origin, goal north of it.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Protocol
 
 import numpy as np
@@ -25,13 +25,18 @@ SPLIT_SIZE = 1_000_000  # indices of a split: [0, SPLIT_SIZE)
 TRIES = 50
 FEW = 10  # worlds whose shortest ways are worked out
 DENSITY_PER_M2 = (0.04, 0.15)  # trees of a forest
+TABLE_PER_M2 = (0.04, 0.08, 0.12, 0.15)  # of forests for tables: kinds forest04 to forest15
 SPARSE_PER_M2 = (0.03, 0.08)  # trees round a barrier
 
 
 def forest(rng: np.random.Generator) -> Site:
     """Trunks of 0.6 m, 0.04 to 0.15 a square metre."""
-    site = parts.yard()
-    return parts.with_trees(site, rng, rng.uniform(*DENSITY_PER_M2), (0.3, 0.3))
+    return trunks(rng.uniform(*DENSITY_PER_M2), rng)
+
+
+def trunks(density_per_m2: float, rng: np.random.Generator) -> Site:
+    """Trunks of 0.6 m, so many a square metre."""
+    return parts.with_trees(parts.yard(), rng, density_per_m2, (0.3, 0.3))
 
 
 def clutter(rng: np.random.Generator) -> Site:
@@ -96,6 +101,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Site]] = {
     "t2like": t2like,
     "pocket": pocket,
     "mixed": mixed,
+    **{f"forest{round(100 * density):02d}": partial(trunks, density) for density in TABLE_PER_M2},
 }
 
 

@@ -1,0 +1,81 @@
+"""What decides a cloning of the expert by DAgger? One frozen value; lies in the run's folder."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from companion.core.params import nearest
+from companion.policy import observations
+from companion.policy.decoder import DecoderParams
+from companion.policy.learned import PolicySpec
+from mission.errors import InputError
+from mission.strict_yaml import read_yaml, write_yaml
+from mission.training.configure import configured, plain
+
+FILE = "dagger.yaml"
+Span = tuple[float, float]  # a flight draws uniformly from it
+
+
+@dataclass(frozen=True, slots=True)
+class DaggerConfig:
+    """Everything: the same value, the same weights."""
+
+    name: str = "forest"  # of the policy
+    world: str = "mixed:train"  # see ``world_source``
+    observation: str = "map"  # see ``companion.policy.observations``
+    hidden: tuple[int, ...] = (256, 256)
+    seed: int = 1
+    rounds: int = 5
+    flights: int = 40  # a round
+    expert_share: tuple[float, ...] = (1.0, 0.3, 0.1, 0.0)  # of the decisions, by round; the last holds on
+    random_share: float = 0.05
+    steps: int = 4000  # of a cloning
+    sigma_rad: float = 0.12  # of the labels: about a heading's width
+    range_sigma_m: Span = (0.0, 0.04)
+    dropout: Span = (0.0, 0.02)
+    latency_s: Span = (0.03, 0.1)
+    scan_latency_s: Span = (0.0, 0.04)
+    wind_m_s: Span = (0.0, 6.0)
+    time_limit_s: float = 90.0
+
+    def __post_init__(self) -> None:
+        """Raise InputError naming what is unknown or out of range."""
+        if self.observation not in observations.SIZES:
+            known = list(observations.SIZES)
+            raise InputError(f"unknown observation '{self.observation}'{nearest(self.observation, known)}")
+        for field in ("rounds", "flights", "steps"):
+            if getattr(self, field) < 1:
+                raise InputError(f"{field} = {getattr(self, field)} wants at least 1")
+        for share in (*self.expert_share, self.random_share):
+            if not 0.0 <= share <= 1.0:
+                raise InputError(f"a share of {share} is outside [0, 1]")
+        if not self.expert_share:
+            raise InputError("expert_share wants one number a round; the last one holds on")
+
+    def policy_spec(self) -> PolicySpec:
+        """What the numbers of the policy mean."""
+        return PolicySpec(self.observation, head="headings", decoder_params=DecoderParams())
+
+    def share_of_expert(self, number: int) -> float:
+        """Share of decisions that the teacher steers in a round, from 0."""
+        return self.expert_share[min(number, len(self.expert_share) - 1)]
+
+
+def write_config(config: DaggerConfig, folder: Path) -> None:
+    """A new run folder; one that holds something is refused. Raises InputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise InputError(f"run folder '{folder}' is not empty; 'swiftnav clone --resume {folder}' goes on with it")
+        temporary = folder / f".{FILE}"
+        write_yaml(temporary, plain(config))
+        temporary.replace(folder / FILE)
+    except OSError as error:
+        raise InputError(f"run folder '{folder}' cannot be written: {error.strerror or error}") from error
+
+
+def read_config(folder: Path) -> DaggerConfig:
+    """The settings of a run that was begun. Raises InputError."""
+    path = folder / FILE
+    if not path.is_file():
+        raise InputError(f"'{folder}' is no run folder: it has no {FILE}")
+    return configured(DaggerConfig, read_yaml(path), str(path))
