@@ -7,6 +7,7 @@ runs of other settings are never mixed in) and ``failures/``. Interrupt at any t
 import dataclasses
 import json
 import multiprocessing
+import os
 import platform
 import subprocess
 from collections.abc import Iterator
@@ -94,8 +95,9 @@ def read_rows(folder: Path, suite: Suite, runs: int | None = None) -> list[Row]:
 
 
 def machine() -> str:
-    """Where this runs."""
-    return f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
+    """Where this runs, and how busy that was: wall times of decisions depend on both."""
+    load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores when begun"
+    return f"{platform.system()} {platform.machine()}, Python {platform.python_version()}, {load}"
 
 
 def commit() -> str:
