@@ -147,8 +147,8 @@ def _picture(document: Path, name: str, entries: list[Flown], draw: Any) -> list
 def _theory() -> str:
     limits = LimitsParams()
     stop = theory.stop_distance_speed(6.0, 0.2, 0.15, limits.decel_m_s2, limits.tau_s)
-    pole = theory.evasion_speed(6.0 - 0.75, 0.75, 0.2, theory.LATENCY_S)
-    trunk = theory.evasion_speed(6.0 - 0.3, 0.3, 0.2, theory.LATENCY_S)
+    pole = theory.evasion_speed(6.0, 0.75, 0.2, theory.LATENCY_S)
+    trunk = theory.evasion_speed(6.0, 0.3, 0.2, theory.LATENCY_S)
     rows = [
         ["stop-distance speed, 6 m seen, hull 0.2 m + 0.15 m", f"{stop:.1f} m/s"],
         ["evasion ceiling, pole of 1.5 m (Loquercio et al.)", f"{pole:.1f} m/s"],

@@ -24,7 +24,7 @@ def draw_pole(entries: Entries, path: Path) -> None:
     figure, ax = _axes("speed at the start [m/s]")
     for name, rows in entries.items():
         _curve(ax, name, rows, lambda cell: float(cell.split()[0]))
-    ceiling = theory.evasion_speed(SEEN_M - POLE_M, POLE_M, HULL_M, theory.LATENCY_S)
+    ceiling = theory.evasion_speed(SEEN_M, POLE_M, HULL_M, theory.LATENCY_S)
     _limit(ax, ceiling, "evasion ceiling, 35 deg of tilt")
     _save(figure, ax, path)
 
@@ -39,7 +39,7 @@ def draw_forest(entries: Entries, path: Path) -> None:
     limits = LimitsParams()
     stop = theory.stop_distance_speed(SEEN_M, HULL_M, 0.15, limits.decel_m_s2, limits.tau_s)
     _limit(ax, stop, "stop-distance speed, 6 m seen")
-    _limit(ax, theory.evasion_speed(SEEN_M - TRUNK_M, TRUNK_M, HULL_M, theory.LATENCY_S), "evasion ceiling, one trunk")
+    _limit(ax, theory.evasion_speed(SEEN_M, TRUNK_M, HULL_M, theory.LATENCY_S), "evasion ceiling, one trunk")
     _save(figure, ax, path)
 
 

@@ -11,7 +11,6 @@ TILT_RAD: Final = math.radians(35.0)
 GRAVITY_M_S2: Final = 9.80665
 # Of a vehicle with PX4's gains: scan, link, tick and tilt lag before a push aside bites.
 LATENCY_S: Final = 0.28
-REST_S: Final = 0.05  # from scan to setpoint in force: part of the latency that is not the vehicle's
 
 
 def lateral_m_s2() -> float:
@@ -24,13 +23,13 @@ def stop_distance_speed(sense_m: float, radius_m: float, margin_m: float, decel_
     return stopping_speed(sense_m - radius_m - margin_m, decel_m_s2, tau_s)
 
 
-def evasion_speed(sense_m: float, obstacle_radius_m: float, vehicle_radius_m: float, latency_s: float) -> float:
+def evasion_speed(ahead_m: float, obstacle_radius_m: float, vehicle_radius_m: float, latency_s: float) -> float:
     """Loquercio's ceiling v = s / (t + sqrt(2 r / (c sin phi))): what one obstacle leaves time to dodge.
 
-    ``r`` is the way aside: both radii. ``c sin phi`` is the sideways acceleration at the tilt limit, height held.
+    ``ahead_m`` to the obstacle's middle, beside which the dodge must be complete. ``r`` is the way aside: both radii. ``c sin phi`` is the sideways acceleration at the tilt limit, height held.
     """
     aside_m = obstacle_radius_m + vehicle_radius_m
-    return sense_m / (latency_s + math.sqrt(2.0 * aside_m / lateral_m_s2()))
+    return ahead_m / (latency_s + math.sqrt(2.0 * aside_m / lateral_m_s2()))
 
 
 def switches_per_min(params: ArbiterParams) -> int:

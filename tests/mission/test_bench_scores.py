@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from mission.bench.rows import barn_log
 from mission.bench.scores import CLIP_025, CLIP_05, barn_score, read_log, summary
+from mission.bench.theory import LATENCY_S, evasion_speed, stop_distance_speed
 from mission.errors import InputError
 
 
@@ -66,3 +67,9 @@ def test_a_log_that_is_none_names_its_line(tmp_path):
     path.write_text("0 1 0 0 7.1 0.5\n0 1 zero\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"log\.txt, line 2"):
         read_log(path)
+
+
+def test_the_ceilings_are_where_a_prototype_met_them():
+    assert 7.1 <= evasion_speed(6.0, 0.75, 0.2, LATENCY_S) <= 7.9  # pole
+    assert 8.6 <= evasion_speed(6.0, 0.3, 0.2, LATENCY_S) <= 9.7  # trunk
+    assert stop_distance_speed(6.0, 0.2, 0.15, 6.0, 0.45) == pytest.approx(6.0, abs=0.1)
