@@ -14,6 +14,7 @@ from mission.cli_clone import clone
 from mission.cli_eval import evaluate, export
 from mission.cli_fly import fly
 from mission.cli_params import app as params_app
+from mission.cli_reproduce import reproduce
 from mission.cli_sitl import sitl
 from mission.cli_train import train
 from mission.cli_worlds import app as worlds_app
@@ -35,6 +36,7 @@ app.command(epilog="Example: swiftnav fly trajectory2 --seed 7 --json")(fly)
 app.command(epilog="Example: swiftnav sitl --world trajectory1 --speed 1")(sitl)
 app.command(epilog="Example: swiftnav train --world trajectory1 --seeds 5 --until-successes 100")(train)
 app.command(epilog="Example: swiftnav clone --world mixed:train --rounds 5 --flights 40 --out runs/forest")(clone)
+app.command(epilog="Example: swiftnav reproduce --only t1,t2 --seeds 5 --jobs 2 --out reproduce")(reproduce)
 app.command("eval", epilog="Example: swiftnav eval geometric --world barrier --episodes 60 --json")(evaluate)
 app.command(epilog="Example: swiftnav export trajectory2 --onnx trajectory2.onnx")(export)
 app.add_typer(worlds_app, name="worlds")

@@ -1,0 +1,99 @@
+"""Does a claim of the paper hold here?  A stated rule on figures of arms, seed by seed; pure.
+
+A claim about a curve holds where at least four seeds in five agree (``AGREED``); one that sets two arms against each
+other compares their means over seeds. ``not run``: an arm of it has no finished seed, or trained too few episodes.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mission.reproduce.measures import Figures, over_seeds
+
+AGREED = 0.8
+Seeds = Sequence[Figures]  # of one arm, one an entry
+Measured = tuple[bool, str]
+
+
+class Verdict(StrEnum):
+    """Every possible answer."""
+
+    HOLDS = "holds"
+    FAILS = "does not hold here"
+    NOT_RUN = "not run"
+
+
+class UnmeasuredError(Exception):
+    """A figure that a rule needs is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """``settings``: the arms that the rule compares, once a set of settings; ``judge`` takes their seeds in order."""
+
+    name: str
+    place: str  # in the paper
+    text: str
+    rule: str
+    settings: Mapping[str, tuple[str, ...]]
+    judge: Callable[..., Measured]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One line of the table."""
+
+    claim: Claim
+    settings: str
+    measured: str
+    verdict: Verdict
+
+
+def judge_all(claims: Sequence[Claim], arms: Mapping[str, Seeds]) -> list[Outcome]:
+    """Every claim under each of its settings; ``arms`` holds the finished seeds of those that were run."""
+    return [_judge(claim, settings, names, arms) for claim in claims for settings, names in claim.settings.items()]
+
+
+def agree(seeds: Seeds, holds: Callable[[Figures], bool]) -> bool:
+    """Do four seeds in five say so?"""
+    return sum(holds(seed) for seed in seeds) >= AGREED * len(seeds)
+
+
+def value(seed: Figures, name: str) -> float:
+    """A figure of one seed. Raises UnmeasuredError."""
+    found = seed[name]
+    if found is None:
+        raise UnmeasuredError(name)
+    return found
+
+
+def mean(seeds: Seeds, name: str) -> float:
+    """Over the seeds that have it. Raises UnmeasuredError where none has."""
+    interval = over_seeds([seed[name] for seed in seeds])
+    if interval is None:
+        raise UnmeasuredError(name)
+    return interval.mean
+
+
+def told(seeds: Seeds, name: str, digits: int = 2) -> str:
+    """Mean and interval for people."""
+    interval = over_seeds([seed[name] for seed in seeds])
+    if interval is None:
+        return "-"
+    text = f"{interval.mean:.{digits}f}"
+    if interval.low is None or interval.high is None:
+        return text
+    return f"{text} [{interval.low:.{digits}f}, {interval.high:.{digits}f}]"
+
+
+def _judge(claim: Claim, settings: str, names: tuple[str, ...], arms: Mapping[str, Seeds]) -> Outcome:
+    missing = [name for name in names if not arms.get(name)]
+    if missing:
+        return Outcome(claim, settings, f"no finished seed of {', '.join(missing)}", Verdict.NOT_RUN)
+    try:
+        holds, measured = claim.judge(*(arms[name] for name in names))
+    except UnmeasuredError as figure:
+        return Outcome(claim, settings, f"too little was flown to tell {figure}", Verdict.NOT_RUN)
+    counts = ", ".join(str(count) for count in dict.fromkeys(len(arms[name]) for name in names))
+    seeds = f"{counts} seed{'' if counts == '1' else 's'}"
+    return Outcome(claim, settings, f"{measured} ({seeds})", Verdict.HOLDS if holds else Verdict.FAILS)
