@@ -26,7 +26,8 @@ def stop_distance_speed(sense_m: float, radius_m: float, margin_m: float, decel_
 def evasion_speed(ahead_m: float, obstacle_radius_m: float, vehicle_radius_m: float, latency_s: float) -> float:
     """Loquercio's ceiling v = s / (t + sqrt(2 r / (c sin phi))): what one obstacle leaves time to dodge.
 
-    ``ahead_m`` to the obstacle's middle, beside which the dodge must be complete. ``r`` is the way aside: both radii. ``c sin phi`` is the sideways acceleration at the tilt limit, height held.
+    ``ahead_m`` to the obstacle's middle, beside which the dodge must be complete; ``r`` is the way aside: both radii;
+    ``c sin phi`` is the sideways acceleration at the tilt limit, height held.
     """
     aside_m = obstacle_radius_m + vehicle_radius_m
     return ahead_m / (latency_s + math.sqrt(2.0 * aside_m / lateral_m_s2()))
