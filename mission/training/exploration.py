@@ -1,8 +1,8 @@
 """How does a policy in training try something else? Both ways of the paper; in waypoint space, never at the motors.
 
 * ``geometric`` (eq. geom_eps): bounded offsets to the five pairs of the action, eps_t * dw, |dw| <= rho.
-* ``epsilon_greedy``: with probability eps a vector drawn evenly from [-1, 1]^d takes the action's place, its first two
-  numbers scaled for more variety of side and curvature.
+* ``epsilon_greedy``: with probability eps a vector drawn evenly from [-1, 1]^d takes the action's place, its first
+  numbers (side and curvature) scaled.
 
 eps falls by a factor an episode. What was drawn lasts for ``hold`` decisions: a detour that is over in a fraction of a
 second leads out of nothing.
@@ -30,7 +30,7 @@ class ExplorationConfig:
     epsilon_least: float = 0.05
     decay: float = 0.98  # lambda, an episode; the paper: 0.995
     radius: float = 1.0  # rho, of ``geometric``, as a share of the action's range
-    first_scale: float = 1.5  # of ``epsilon_greedy``
+    scales: tuple[float, ...] = (1.5, 1.5)  # of ``epsilon_greedy``: of the first numbers; beyond 1 is cut
     at_entry_only: bool = False  # ``epsilon_greedy``: draw only where RL mode was just entered, as the paper
     hold: int = 6  # decisions that a draw lasts, whatever came of it
 
@@ -104,5 +104,5 @@ class Exploration:
 
     def _uniform(self) -> F32:
         drawn = self._rng.uniform(-1.0, 1.0, self._dim)
-        drawn[:2] *= self._config.first_scale
+        drawn[: len(self._config.scales)] *= self._config.scales
         return np.clip(drawn, -1.0, 1.0).astype(np.float32)

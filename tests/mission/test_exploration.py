@@ -50,7 +50,7 @@ def test_epsilon_greedy_replaces_the_action_so_often() -> None:
 
 
 def test_drawn_actions_are_even_and_the_first_two_reach_further() -> None:
-    exploring = explorer(hold=1, first_scale=1.5)
+    exploring = explorer(hold=1, scales=(1.5, 1.5))
     drawn = np.array([exploring.explore(GREEDY, INSIDE) for _ in range(4000)])
     at_bounds = (np.abs(drawn) == 1.0).mean(axis=0)
     assert at_bounds[:2] == pytest.approx([1.0 / 3.0] * 2, abs=0.03)
