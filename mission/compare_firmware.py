@@ -20,6 +20,8 @@ import numpy as np
 from companion.core.geometry import points_to_polyline_distance
 from companion.core.types import F64
 from mission.attack import fly_quietly
+from mission.cli_options import json_ready
+from mission.errors import FlightError, InputError
 from mission.flight_log import read_truth
 from mission.flight_plan import FlightPlan, plan_flight
 from mission.judge import Result
@@ -97,13 +99,21 @@ def _json(comparison: Comparison) -> dict[str, Any]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Fly all, print the table. Exit code 0 when every seed is fine."""
+    """Fly all, print the table. Exit code 0 when every seed is fine, 2 where something cannot be flown."""
     parser = argparse.ArgumentParser(prog="python -m mission.compare_firmware", description=__doc__)
     parser.add_argument("mission", nargs="?", default="trajectory1")
     parser.add_argument("--seeds", type=_seeds, default=range(10), help="first:last + 1")
     parser.add_argument("--instance", type=int, default=0)
     parser.add_argument("--json", action="store_true", help="one object a line in place of the table")
     given = parser.parse_args(arguments)
+    try:
+        return 0 if _all_fine(given) else 1
+    except (InputError, FlightError) as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+def _all_fine(given: argparse.Namespace) -> bool:
     binary = os.environ.get("PX4_BIN")
     build = find_build(Path(binary)) if binary else None
     check_ports(given.instance, Firmware.PX4)
@@ -113,9 +123,9 @@ def main(arguments: list[str] | None = None) -> int:
     for seed in given.seeds:
         with tempfile.TemporaryDirectory(prefix="swiftnav-compare-") as folder:
             comparison = compare(plan_flight(given.mission, seed), build, given.instance, Path(folder))
-        print(json.dumps(_json(comparison)) if given.json else comparison.row(), flush=True)
+        print(json.dumps(json_ready(_json(comparison))) if given.json else comparison.row(), flush=True)
         fine = fine and comparison.fine
-    return 0 if fine else 1
+    return fine
 
 
 if __name__ == "__main__":

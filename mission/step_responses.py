@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from companion.core.types import F64
-from mission.errors import InputError
+from mission.errors import FlightError, InputError
 from mission.figures_style import GRID_COLOUR, INK, MODE_COLOURS, MUTED
 from mission.px4_firmware import find_build
 from mission.step_flights import fly_embedded, fly_px4
@@ -81,10 +81,10 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     try:
         build = find_build(Path(binary))
-    except InputError as error:
+        tracks = dict(zip(LINES, (fly_embedded(), fly_px4(build, given.instance)), strict=True))
+    except (InputError, FlightError) as error:
         print(error, file=sys.stderr)
         return 2
-    tracks = dict(zip(LINES, (fly_embedded(), fly_px4(build, given.instance)), strict=True))
     given.out.mkdir(parents=True, exist_ok=True)
     draw(tracks, given.out / FIGURE)
     rows, agree = table(tracks)

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from companion.core.types import F64
-from sitl.neighbours import ROW, Neighbours, others, row_of
+from sitl.neighbours import ROW, Neighbours, row_of
 from sitl.simulation import Simulation
 
 WORD: Final = struct.Struct(f"<{ROW}d?")  # where a vehicle is, and whether it has flown and disarmed
@@ -103,11 +103,3 @@ class Hub:
         told, self._told = self._told, {}
         for own in self._channels:
             own.send_bytes(b"".join(told[channel] for channel in self._channels if channel is not own))
-
-
-def exchange(sims: Sequence[Simulation]) -> None:
-    """The same in one process: simulations at the same scan instant tell each other where they are."""
-    rows = [row_of(sim.truth, sim.spawn_ned_m) for sim in sims]
-    for index, sim in enumerate(sims):
-        if sim.neighbours is not None:
-            sim.neighbours.hear(sim.world_s, others(rows, index))

@@ -6,7 +6,6 @@ clearance are between the hulls as they are.
 """
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -60,8 +59,3 @@ class Neighbours:
 def row_of(truth: Truth, spawn_ned_m: F64) -> F64:
     """What a vehicle says of itself, (6,)."""
     return np.concatenate([truth.pos_ned_m + spawn_ned_m, truth.vel_ned_m_s])
-
-
-def others(rows: Sequence[F64], own: int) -> F64:
-    """The rows of all but one, (n - 1, 6)."""
-    return np.array([row for index, row in enumerate(rows) if index != own]).reshape(-1, ROW)

@@ -22,6 +22,7 @@ from sitl.world import World
 START: Final = (3.0, -2.25)  # north, east; facing north
 GOAL: Final = (13.0, -2.25)
 BOUNDS: Final = (-1.0, -9.0, 16.0, 4.5)  # wider than the field, which is walled on three sides
+FIELD: Final = (2.0, -5.5, 14.0, 1.0)  # where a way is looked for: the open ground round it makes none
 CELL_M: Final = 0.15  # of the reference path: cell (row, column) is x = .15 row - 4.575, y = .15 column + 5.075
 ORIGIN_M: Final = (5.075, -4.575)  # north of column 0, east of row 0
 FINE_M: Final = 0.025  # cells of the search for a way: gaps are a few centimetres wider than the vehicle
@@ -69,15 +70,10 @@ def reference_length_m(cells: F64) -> float:
 
 def _course(number: int, obstacles: Obstacles, path: Path | None) -> Course:
     world = World(f"barn_{number}", np.array(START), np.array(GOAL), BOUNDS, obstacles.circles, obstacles.boxes)
-    check_world(_field(world), RULES.radius_m, 0.0, FINE_M)
+    check_world(dataclasses.replace(world, bounds_m=FIELD), RULES.radius_m, 0.0, FINE_M)
     if path is None:
         raise WorldError(f"barn_{number}: path_{number}.npy is missing: the score is made of the reference path")
     return Course("barn", world.name, world, RULES, _length_of(path))
-
-
-def _field(world: World) -> World:
-    """The part in which ways lead through: the open ground round it makes none."""
-    return dataclasses.replace(world, bounds_m=(2.0, -5.5, 14.0, 1.0))
 
 
 def _length_of(path: Path) -> float:

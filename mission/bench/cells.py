@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.signal import convolve2d
 
 from companion.core.types import F64
+from mission.bench.barn import BOUNDS, FIELD, FINE_M, GOAL, RULES, START
 from mission.world_check import WorldError, check_world
 from mission.world_generator import hash_of
 from sitl.world import World
@@ -29,13 +30,7 @@ BIRTH, DEATH = 5, 1  # filled neighbours of eight from which a cell is filled, a
 BOX_CELLS: Final = 33  # of the walled box before the field
 SOUTH_M: Final = 5.075  # north of the first row of the field
 WEST_M: Final = -4.425  # east of the first column
-START: Final = (3.0, -2.25)
-GOAL: Final = (13.0, -2.25)
-BOUNDS: Final = (-1.0, -9.0, 16.0, 4.5)
-FIELD_M: Final = (2.0, -5.5, 14.0, 1.0)  # where a way is looked for
-RADIUS_M: Final = 0.33
 SPARE_M: Final = 0.02  # of the narrowest way, to either side
-FINE_M: Final = 0.025
 FIRST_SEED: Final = 50_000
 COUNT: Final = 50
 
@@ -61,8 +56,8 @@ def generate(seed: int) -> World:
         filled = smoothed(filled)
     places = np.concatenate([_field(filled), _box()])
     circles = np.column_stack([places, np.full(len(places), CYLINDER_M), np.full(len(places), np.inf)])
-    world = World(f"cells_{seed}", np.array(START), np.array(GOAL), FIELD_M, circles, np.empty((0, 6)))
-    check_world(world, RADIUS_M, SPARE_M, FINE_M)
+    world = World(f"cells_{seed}", np.array(START), np.array(GOAL), FIELD, circles, np.empty((0, 6)))
+    check_world(world, RULES.radius_m, SPARE_M, FINE_M)
     return World(world.name, world.start_ned_m, world.goal_ned_m, BOUNDS, circles, world.boxes)
 
 

@@ -18,8 +18,9 @@ from companion.core.codec import quantise_setpoint
 from companion.core.inputs import Inputs
 from companion.core.task import Task
 from companion.core.types import F64, Setpoint
-from mission.bench.course import Course
+from mission.bench.course import Course, Rules
 from mission.bench.stress import NONE, Stress
+from mission.errors import FlightError
 from mission.pilots.interface import Oracle, Pilot, PilotNote
 from sitl.lidar import LidarParams
 from sitl.modes import FlightMode
@@ -30,7 +31,6 @@ LOOK_S: Final = 0.4  # the pilot looks round in hover: two cycles of the LiDAR's
 RUN_UP_M_S2: Final = 4.0
 RUN_UP_STEADY_S: Final = 1.5  # at speed before the start
 STANDING_M_S: Final = 0.2  # slower than this the vehicle stands: what touches it then has come by itself
-
 TOUCHING_M: Final = 0.1  # a mover this near to the hull at the end of a scan period is what touched it
 
 
@@ -83,7 +83,7 @@ def fly(
     stress: Stress = NONE,
     px4_params: dict[str, float] | None = None,
 ) -> Flown:
-    """One flight. Raises RuntimeError when the vehicle does not come to the start."""
+    """One flight. Raises FlightError when the vehicle does not come to the start."""
     draws = np.random.SeedSequence(seed).spawn(2)
     start = _start_place(course, np.random.default_rng(draws[0]))
     back_m = _run_up_m(course.rules.speed_m_s) if course.rules.at_speed else 0.0
@@ -138,7 +138,7 @@ def _take_off(sim: Simulation) -> Observation:
         if not autopilot.armed and autopilot.ready:
             autopilot.command_arm()
             autopilot.command_takeoff()
-    raise RuntimeError(f"no take-off within {GROUND_LIMIT_S:g} s")
+    raise FlightError(f"no take-off within {GROUND_LIMIT_S:g} s")
 
 
 def _look_round(
@@ -160,7 +160,7 @@ def _run_up_m(speed_m_s: float) -> float:
     return speed_m_s * speed_m_s / (2.0 * RUN_UP_M_S2) + speed_m_s * RUN_UP_STEADY_S
 
 
-def _run_up(sim: Simulation, back_m: float, rules: Any) -> Observation:
+def _run_up(sim: Simulation, back_m: float, rules: Rules) -> Observation:
     """North along the line until the start is reached at speed; the pilot has seen nothing yet."""
     hold = Setpoint(sim.t_s, np.array([0.0, 0.0, -rules.altitude_m]), None, None, 0.0)
     for _ in range(2):
@@ -176,7 +176,7 @@ def _run_up(sim: Simulation, back_m: float, rules: Any) -> Observation:
         sim.submit(
             quantise_setpoint(Setpoint(seen.state.t_s, here, np.array([v, 0.0, 0.0]), np.array([a, 0.0, 0.0]), 0.0))
         )
-    raise RuntimeError(f"the start was not reached within {GROUND_LIMIT_S:g} s")
+    raise FlightError(f"the start was not reached within {GROUND_LIMIT_S:g} s")
 
 
 def _ramp(t_s: float, speed_m_s: float) -> tuple[float, float, float]:

@@ -57,16 +57,15 @@ COLUMNS: Final = tuple(f.name for f in dataclasses.fields(Row))
 
 
 def append(path: Path, row: Row) -> None:
-    """Add one row in one write; the file begins with the names of the columns."""
-    new = not path.exists() or path.stat().st_size == 0
+    """Add one row in one write, in place of a line that was cut off; the file begins with the names of the columns."""
+    kept = _whole_lines(path)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    if new:
+    if not kept:
         writer.writerow(COLUMNS)
     writer.writerow([_cell(getattr(row, name)) for name in COLUMNS])
     with path.open("ab") as file:
-        if not new and not _ends_whole(path):
-            file.write(b"\n")
+        file.truncate(len(kept))
         file.write(text.getvalue().encode())
         file.flush()
         os.fsync(file.fileno())
@@ -74,10 +73,7 @@ def append(path: Path, row: Row) -> None:
 
 def read(path: Path) -> list[Row]:
     """Every whole row, one for each cell and run: the first. Raises InputError where the file is another kind."""
-    if not path.is_file():
-        return []
-    with path.open(encoding="utf-8", newline="") as file:
-        lines = list(csv.reader(file))
+    lines = list(csv.reader(io.StringIO(_whole_lines(path).decode(), newline="")))
     if lines and tuple(lines[0]) != COLUMNS:
         raise InputError(f"{path}: other columns than this version writes; choose another --out")
     rows: dict[tuple[str, int], Row] = {}
@@ -98,10 +94,10 @@ def barn_log(rows: Iterable[Row], metric: Any) -> str:
     return "".join(lines)
 
 
-def _ends_whole(path: Path) -> bool:
-    with path.open("rb") as file:
-        file.seek(-1, os.SEEK_END)
-        return file.read(1) == b"\n"
+def _whole_lines(path: Path) -> bytes:
+    """What is there, up to the last end of a line."""
+    data = path.read_bytes() if path.is_file() else b""
+    return data[: data.rfind(b"\n") + 1]
 
 
 def _row(line: list[str]) -> Row | None:

@@ -130,7 +130,9 @@ def _claim(path: Path, spec: SuiteSpec, entry: Entry) -> None:
         return
     stamp = datetime.now(UTC).strftime("%Y-%m-%d")
     text = json.dumps({**settings, "date": stamp, "commit": commit(), "machine": machine()}, indent=1)
-    path.write_text(text + "\n", encoding="utf-8")
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(text + "\n", encoding="utf-8")
+    part.replace(path)  # whole or not at all
 
 
 def _flown(suite: Suite, entry: Entry, todo: list[Job], jobs: int) -> Iterator[Row]:

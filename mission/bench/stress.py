@@ -9,8 +9,6 @@ from companion.core.params import nearest
 from companion.core.types import Scan
 from mission.errors import InputError
 
-QUARTER_TURN_RAD: Final = np.pi / 2
-
 
 @dataclass(frozen=True, slots=True)
 class Stress:

@@ -14,8 +14,8 @@ import numpy as np
 
 from companion.core.params import nearest
 from mission.bench import cells, published_sets
+from mission.bench.barn import FINE_M, load_barn
 from mission.bench.barn import RULES as BARN_RULES
-from mission.bench.barn import load_barn
 from mission.bench.course import Course, Rules, Skipped
 from mission.errors import InputError
 from mission.mission_file import load_mission
@@ -105,7 +105,7 @@ def _track(name: str, run: int) -> Course:
 
 def _barn(folder: Path | None, part: str) -> Suite:
     if folder is None:
-        raise InputError("suite 'barn' wants a folder with the worlds: swiftnav bench barn --worlds FOLDER")
+        raise InputError("suite 'barn' wants a folder with the worlds: swiftnav bench barn FOLDER")
     barn = load_barn(folder)
     chosen = PARTS[part](barn.courses) if part in PARTS else None
     if chosen is None:
@@ -204,7 +204,7 @@ def _heldout(_folder: Path | None, _part: str) -> Suite:
 def _heldout_course(run: int) -> Course:
     seeds = cells.held_out().seeds
     world = cells.generate(seeds[run % len(seeds)])
-    length_m = shortest_path_m(world, world.start_ned_m, world.goal_ned_m, cells.RADIUS_M, cells.FINE_M)
+    length_m = shortest_path_m(world, world.start_ned_m, world.goal_ned_m, BARN_RULES.radius_m, FINE_M)
     return Course("heldout", world.name, world, BARN_RULES, length_m)
 
 

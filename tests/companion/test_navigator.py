@@ -65,6 +65,13 @@ def test_what_was_seen_while_the_motors_were_off_is_forgotten() -> None:
     assert len(pilot.tick(status=HOVERING).percept.static_ne_m) == 0
 
 
+def test_who_took_the_vehicle_back_finds_neither_policy_nor_guard_with_an_old_way() -> None:
+    pilot, _ = in_rl()
+    pilot.memory = dataclasses.replace(pilot.memory, policy=np.zeros(3), guard=np.zeros((2, 2)))
+    memory = pilot.tick(status=HOVERING).memory
+    assert (memory.policy, memory.guard) == (None, None)
+
+
 @pytest.mark.parametrize("ground_down_m", [-1.2, -0.5, 0.0, 0.7])
 def test_the_ground_is_where_the_vehicle_last_stood(ground_down_m: float) -> None:
     pilot = Pilot(Eye(OPEN), GOAL)

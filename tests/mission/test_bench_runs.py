@@ -113,6 +113,16 @@ def test_rows_come_back_as_they_were_and_a_torn_line_does_not(tmp_path):
     assert read(path) == [*rows, row(2)]
 
 
+@pytest.mark.parametrize("cut", [10, -1, -4])  # in the names of the columns, before the end of the line, in the commit
+def test_wherever_the_first_write_was_torn_the_run_is_flown_again(tmp_path, cut):
+    path = tmp_path / "runs.csv"
+    append(path, row(0))
+    path.write_bytes(path.read_bytes()[:cut])
+    assert read(path) == []
+    append(path, row(1))
+    assert read(path) == [row(1)]
+
+
 def counting_suite(flown):
     def course(run_number):
         flown.append(run_number)

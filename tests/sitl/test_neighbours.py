@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.core.types import Setpoint
-from sitl.airspace import Airspace, Hub, exchange
+from sitl.airspace import Airspace, Hub
 from sitl.formation import SPACING_M, fleet, places
 from sitl.geo import Origin
 from sitl.modes import FlightMode
-from sitl.neighbours import HALF_HEIGHT_M, Neighbours
+from sitl.neighbours import HALF_HEIGHT_M, Neighbours, row_of
 from sitl.simulation import SimConfig, Simulation
 from sitl.truth_log import truth_sha256
 from sitl.vehicle_config import ConfigError, VehicleConfig, from_json
@@ -37,7 +37,10 @@ def vehicle(north_m: float, east_m: float, seed: int = 0) -> Simulation:
 
 def step(sims: list[Simulation]) -> list[np.ndarray]:
     scans = [sim.advance_to_scan().scan for sim in sims]
-    exchange(sims)
+    rows = [row_of(sim.truth, sim.spawn_ned_m) for sim in sims]
+    for own, sim in enumerate(sims):
+        assert sim.neighbours is not None
+        sim.neighbours.hear(sim.world_s, np.array([row for index, row in enumerate(rows) if index != own]))
     return [scan.range_m for scan in scans]
 
 
