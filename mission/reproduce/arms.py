@@ -39,7 +39,7 @@ class ArmSpec(StrictModel):
     group: str
     text: str
     world: str
-    preset: str = "default"
+    preset: str | None = None
     settings: dict[str, Any] = Field(default_factory=dict)
     until: UntilSpec | None = None
     ticks_of: str | None = None
@@ -49,6 +49,7 @@ class TableSpec(StrictModel):
     """The file."""
 
     until: UntilSpec
+    presets: dict[str, str] = Field(default_factory=dict)  # by world, of arms that name none
     flights: int
     arms: dict[str, ArmSpec]
 
@@ -117,7 +118,9 @@ def _table(data: dict[str, Any], where: str, quick: bool) -> Table:
     spec = checked(TableSpec, data, where)
     arms: list[Arm] = []
     for name, row in spec.arms.items():
-        arm = _arm(name, row, spec.until, where, quick)
+        usual = row.until or spec.until
+        preset = row.preset or spec.presets.get(row.world, "default")
+        arm = _arm(name, row.model_copy(update={"until": usual, "preset": preset}), where, quick)
         if arm.ticks_of is not None and arm.ticks_of not in [earlier.name for earlier in arms]:
             raise InputError(f"{where}: arm '{name}': ticks_of '{arm.ticks_of}' is no arm before it")
         twin = next((earlier.run for earlier in arms if _same(earlier, arm)), name)
@@ -125,14 +128,17 @@ def _table(data: dict[str, Any], where: str, quick: bool) -> Table:
     return Table(tuple(arms), QUICK_FLIGHTS if quick else spec.flights, quick)
 
 
-def _arm(name: str, row: ArmSpec, usual: UntilSpec, where: str, quick: bool) -> Arm:
+def _arm(name: str, row: ArmSpec, where: str, quick: bool) -> Arm:
+    """From a row that names preset and end."""
+    assert row.preset is not None
+    assert row.until is not None
     told = f"{where}: arm '{name}'"
     if row.group not in GROUPS:
         raise InputError(f"{told}: unknown group '{row.group}'{nearest(row.group, list(GROUPS))}")
     settings = {**row.settings, **(QUICK_SETTINGS if quick else {})}
     try:
         preset = load_preset(row.preset, _nested(settings))
-        until = Until(**(QUICK_UNTIL if quick else (row.until or usual).model_dump()))
+        until = Until(**(QUICK_UNTIL if quick else row.until.model_dump()))
     except (InputError, ValueError) as error:
         raise InputError(f"{told}: {error}") from error
     return Arm(name, name, row.group, row.text, row.world, preset, row.settings, until, row.ticks_of)

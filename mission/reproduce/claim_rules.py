@@ -1,7 +1,7 @@
 """By which rule is each claim of the paper tested?  One function a claim: does it hold, and the figures for people."""
 
-from mission.reproduce.claims import Measured, Seeds, agree, mean, told, value
-from mission.reproduce.measures import Figures, over_seeds
+from mission.reproduce.claims import Measured, Seeds, UnmeasuredError, agree, mean, told, value
+from mission.reproduce.measures import Figures, Interval, interval_of
 
 TEN_THOUSAND = (3162.0, 31623.0)  # what rounds to ten to the fourth
 LIMIT_STEPS = 900.0  # the time limit of 90 s
@@ -10,7 +10,8 @@ SCAN_MS = 40.0
 
 def reaches(seeds: Seeds) -> Measured:
     """100 successes."""
-    return agree(seeds, lambda s: value(s, "reached") > 0), f"episodes to the end {told(seeds, 'episodes', 0)}"
+    done = f"{told(seeds, 'successes', 0)} successes in {told(seeds, 'episodes', 0)} episodes"
+    return agree(seeds, lambda s: value(s, "reached") > 0), done
 
 
 def never_converges(vanilla: Seeds, swift: Seeds) -> Measured:
@@ -183,12 +184,17 @@ def _spreads(seeds: Seeds) -> str:
 
 def _lower(seeds: Seeds, name: str) -> float:
     """Of the interval over seeds; one seed is its own."""
-    interval = over_seeds([value(seed, name) for seed in seeds])
-    assert interval is not None  # value() has told what is missing
+    interval = _known(seeds, name)
     return interval.mean if interval.low is None else interval.low
 
 
 def _upper(seeds: Seeds, name: str) -> float:
-    interval = over_seeds([value(seed, name) for seed in seeds])
-    assert interval is not None
+    interval = _known(seeds, name)
     return interval.mean if interval.high is None else interval.high
+
+
+def _known(seeds: Seeds, name: str) -> Interval:
+    interval = interval_of(seeds, name)
+    if interval is None:
+        raise UnmeasuredError(name)
+    return interval

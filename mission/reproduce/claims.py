@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mission.reproduce.measures import Figures, over_seeds
+from mission.reproduce.measures import Figures, interval_of
 
 AGREED = 0.8
 Seeds = Sequence[Figures]  # of one arm, one an entry
@@ -69,7 +69,7 @@ def value(seed: Figures, name: str) -> float:
 
 def mean(seeds: Seeds, name: str) -> float:
     """Over the seeds that have it. Raises UnmeasuredError where none has."""
-    interval = over_seeds([seed[name] for seed in seeds])
+    interval = interval_of(seeds, name)
     if interval is None:
         raise UnmeasuredError(name)
     return interval.mean
@@ -77,7 +77,7 @@ def mean(seeds: Seeds, name: str) -> float:
 
 def told(seeds: Seeds, name: str, digits: int = 2) -> str:
     """Mean and interval for people."""
-    interval = over_seeds([seed[name] for seed in seeds])
+    interval = interval_of(seeds, name)
     if interval is None:
         return "-"
     text = f"{interval.mean:.{digits}f}"

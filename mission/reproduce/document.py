@@ -12,6 +12,7 @@ from mission.reproduce.findings import ArmFindings, Findings
 from mission.reproduce.measures import Interval
 from mission.reproduce.paper_claims import CLAIMS
 from mission.reproduce.pictures import Picture
+from mission.training.baselines import RANDOM, STRAIGHT
 
 README = "README.md"
 DOCUMENT, PREFIX = "reproduction.md", "reproduction_"
@@ -108,10 +109,10 @@ def _stamp(found: Findings) -> str:
 
 
 def _claims(found: Findings) -> str:
-    counts = ", ".join(f"{count} {name}" for name, count in found.counts().items())
+    counts = ", ".join(f"{name}: {count}" for name, count in found.counts().items())
     lines = [_claim_line(outcome) for outcome in found.outcomes]
     head = ["paper claim", "where", "settings", "measured here", "holds?"]
-    return f"## Claims of the paper\n\nOf {len(lines)}: {counts}.\n\n{_table(head, lines)}"
+    return f"## Claims of the paper\n\n{len(lines)} judged. {counts[:1].upper()}{counts[1:]}.\n\n{_table(head, lines)}"
 
 
 def _claim_line(outcome: Outcome) -> list[str]:
@@ -123,7 +124,7 @@ def _rules() -> str:
     lines = [[claim.text, claim.rule] for claim in CLAIMS]
     text = (
         "*First* and *last* are means over fifteen episodes, *smooth* is the 15-episode moving average, its *wobble* "
-        "the deviation from its own straight line."
+        "the deviation from a straight line through each third of it."
     )
     return f"## Rules\n\n{text}\n\n{_table(['paper claim', 'holds if'], lines)}"
 
@@ -133,7 +134,26 @@ def _group(group: str, found: Findings) -> str:
     if not arms:
         return ""
     head = ["arm", "what", "preset, differs by", "seeds", *(label for label, _, _ in ARM_COLUMNS)]
-    return f"### {TITLES[group]}\n\n{_table(head, [_arm_line(arm) for arm in arms])}"
+    return f"### {TITLES[group]}\n\n{_table(head, [_arm_line(arm) for arm in arms])}{_idle(arms)}"
+
+
+def _idle(arms: Sequence[ArmFindings]) -> str:
+    """What policies that learn nothing do under the same checker, where the first evaluation says so."""
+    lines = []
+    for found in arms:
+        if not found.arm.preset.env.checker:
+            continue  # those flights have it
+        first = found.seeds[0].evaluations[:1]
+        names = [name for row in first for name in (STRAIGHT, RANDOM) if name in row]
+        if names:
+            told = (f"{name} {first[0][name]['success']:.2f} ({_ratio(first[0][name])})" for name in names)
+            lines.append(f"`{found.arm.name}`: {', '.join(told)}")
+    return f"\nSuccess (path ratio) of policies that learn nothing there: {'; '.join(lines)}.\n" if lines else ""
+
+
+def _ratio(figures: dict[str, Any]) -> str:
+    ratio = figures["path_ratio"]
+    return "-" if ratio is None else f"{ratio:.2f}"
 
 
 def _arm_line(found: ArmFindings) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Any
 from companion.core.types import F64
 from mission.reproduce.arms import Arm, Table
 from mission.reproduce.claims import Outcome, Verdict, judge_all
-from mission.reproduce.measures import Figures, Interval, SeedRows, figures_of, over_seeds, read_seed
+from mission.reproduce.measures import Figures, Interval, SeedRows, figures_of, interval_of, read_seed
 from mission.reproduce.paper_claims import CLAIMS
 from mission.reproduce.run import arm_folder
 from mission.training.run_folder import RUN_FILE, open_run
@@ -32,7 +32,7 @@ class ArmFindings:
     def over_seeds(self) -> dict[str, Interval | None]:
         """Each figure with its interval."""
         names = dict.fromkeys(name for seed in self.figures for name in seed)
-        return {name: over_seeds([seed.get(name) for seed in self.figures]) for name in names}
+        return {name: interval_of(self.figures, name) for name in names}
 
 
 @dataclass(frozen=True, slots=True)

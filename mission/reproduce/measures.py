@@ -30,6 +30,7 @@ SETTLED = 50  # episodes, "a few dozen": from here on a tight band is a tight ba
 LAST_SHARE = 50  # episodes over which late success is counted
 LEAST_GAIN_M = 1.0  # a track that gained less counts as this: going nowhere is a long detour, not an endless one
 CONFIDENCE = 0.95
+SHARES = ("reached", "success_last50", "contact", "rl_share", "greedy_success", "greedy_contact")
 STAMP = ("date", "commit", "machine")
 
 
@@ -40,7 +41,8 @@ class SeedRows:
     seed: int
     episodes: list[Row]
     tracks: dict[int, F64]  # by episode, (n, 2) world
-    flights: list[Row]  # greedy
+    evaluations: list[Row]  # greedy flights at checkpoints; the first seed's first beside policies that learn nothing
+    flights: list[Row]  # greedy, at the end
     decision_p99_ms: float | None
     stamp: dict[str, str]  # date, commit, machine
     result: Row | None  # None: not done
@@ -69,6 +71,7 @@ def read_seed(folder: Path, seed: int) -> SeedRows:
         seed,
         list(read_rows(rows_file(at, "episodes"))),
         {row["episode"]: np.array(row["track_ne_m"]) for row in read_rows(rows_file(at, "tracks"))},
+        list(read_rows(rows_file(at, "evaluations"))),
         greedy.get("flights", []),
         greedy.get("decision_p99_ms"),
         {name: greedy[name] for name in STAMP if name in greedy},
@@ -112,20 +115,28 @@ def over_seeds(values: Sequence[float | None]) -> Interval | None:
     return Interval(mean, mean - half, mean + half, len(known))
 
 
+def interval_of(seeds: Sequence[Figures], name: str) -> Interval | None:
+    """A figure over seeds; the interval of a share stays in [0, 1]."""
+    found = over_seeds([seed.get(name) for seed in seeds])
+    if found is None or found.low is None or found.high is None or name not in SHARES:
+        return found
+    return Interval(found.mean, max(found.low, 0.0), min(found.high, 1.0), found.seeds)
+
+
 def smooth(values: Sequence[float]) -> F64:
     """The moving average over whole windows; empty for fewer episodes than one."""
     return moving_average(np.array(values, np.float64), WINDOW)[WINDOW - 1 :]
 
 
 def _trend(name: str, values: Sequence[float]) -> Figures:
-    """Where a curve begins and ends, how wide its tail is, how much it wobbles about its own straight line."""
+    """Where a curve begins and ends, how wide its tail is, how much it wobbles."""
     names = ("first", "last", "sd_first", "sd_last", "highest", "tail_width", "wobble", "wobble_mid", "wobble_late")
     curve = smooth(values)
     if len(curve) < 2 * WINDOW:
         return {f"{name}_{part}": None for part in names}
     first, last = np.array(values[:WINDOW]), np.array(values[-WINDOW:])
-    tail, third = curve[SETTLED - WINDOW :], len(curve) // 3
-    off = curve - np.polyval(np.polyfit(np.arange(len(curve)), curve, 1), np.arange(len(curve)))
+    tail = curve[SETTLED - WINDOW :]
+    wobbles = [_wobble(part) for part in np.array_split(curve, 3)]
     found = (
         np.mean(first),
         np.mean(last),
@@ -133,11 +144,17 @@ def _trend(name: str, values: Sequence[float]) -> Figures:
         np.std(last),
         np.max(curve),
         np.ptp(tail) / max(abs(float(np.mean(tail))), 1e-9) if len(tail) >= WINDOW else None,
-        np.std(off),
-        np.std(off[third : 2 * third]),
-        np.std(off[2 * third :]),
+        np.mean(wobbles),
+        wobbles[1],
+        wobbles[2],
     )
     return {f"{name}_{part}": None if x is None else float(x) for part, x in zip(names, found, strict=True)}
+
+
+def _wobble(values: F64) -> float:
+    """Standard deviation from the straight line through a piece of a curve."""
+    at = np.arange(len(values))
+    return float(np.std(values - np.polyval(np.polyfit(at, values, 1), at)))
 
 
 def _detours(rows: SeedRows, goal_ne_m: F64 | None) -> Figures:

@@ -19,7 +19,7 @@ from mission.world_file import load_world
 FIGURES = "figures"
 CURVES_TEXT = (
     "15-episode moving averages of episode length (steps of 0.1 s) and return: mean and 95 % interval over seeds, thin "
-    "lines the seeds."
+    "lines the seeds"
 )
 
 
@@ -87,7 +87,11 @@ def _curves_of(found: Findings, out: Path, names: tuple[str, str], name: str, ti
     if not arms:
         return None
     draw_curves([(f"{arm.arm.text} ({_seeds(arm)})", arm.seeds) for arm in arms], file_of(out, name))
-    return Picture(file_of(out, name), title, f"{CURVES_TEXT} (Fig. perf_both)")
+    return Picture(
+        file_of(out, name),
+        title,
+        f"{CURVES_TEXT} (Fig. perf_both). Right, greedy flights at checkpoints, a line a seed.",
+    )
 
 
 def _baseline(found: Findings, out: Path) -> Picture | None:
@@ -107,7 +111,7 @@ def _ablations(found: Findings, out: Path) -> Picture | None:
     path = file_of(out, "ablations")
     titles = {"t2": "both on", "no_stability": "No-Stability", "no_checker": "No-Checker"}
     draw_ablations([(f"{titles[arm.arm.name]} ({_seeds(arm)})", arm.seeds) for arm in arms], path)
-    return Picture(path, "Ablations on Trajectory 2", f"{CURVES_TEXT} Switches of nav modes below (Fig. ablation).")
+    return Picture(path, "Ablations on Trajectory 2", f"{CURVES_TEXT}; switches of nav modes below (Fig. ablation).")
 
 
 def _beyond(found: Findings, out: Path) -> Picture | None:

@@ -16,12 +16,13 @@ from companion.core.types import F64
 from mission.figures_style import BAD_COLOUR, GOOD_COLOUR, GRID_COLOUR, INK, MUTED
 from mission.figures_world import draw_world
 from mission.reproduce.measures import Interval, SeedRows, over_seeds
-from mission.training.figures import WINDOW, moving_average, spread_episodes
+from mission.training.figures import GREEDY, POLICY_COLOURS, WINDOW, moving_average, spread_episodes
 from sitl.world import World
 
 SWIFT_COLOUR, VANILLA_COLOUR = "#2b6cb0", "#d9580d"
 THIRD_COLOUR = "#8a63d2"
-DPI = 100
+DPI = 90
+SMALL = {"optimize": True}
 PANEL_INCH = (4.4, 2.9)
 SHOWN_TRACKS = 10  # of each, over a world
 
@@ -52,13 +53,18 @@ def band(seeds: Arm, key: str, window: int = WINDOW) -> Band:
 
 
 def draw_curves(rows: Sequence[tuple[str, Arm]], picture: Path) -> None:
-    """Steps and return of each arm, one row an arm: the paper's Fig. perf_both."""
-    figure, axes = _panels(len(rows), 2)
-    for (title, seeds), (left, right) in zip(rows, axes, strict=True):
-        _draw_band(left, band(seeds, "steps"), SWIFT_COLOUR, "steps")
-        _draw_band(right, band(seeds, "return"), VANILLA_COLOUR, "return")
-        left.set_title(title, color=INK, fontsize=10, loc="left")
-    figure.savefig(picture, dpi=DPI)
+    """Steps and return of each arm, one row an arm (the paper's Fig. perf_both), beside them greedy checkpoints."""
+    figure, axes = _panels(len(rows), 4, inch=(3.3, 2.6))
+    for (title, seeds), (steps, total, success, ratio) in zip(rows, axes, strict=True):
+        _draw_band(steps, band(seeds, "steps"), SWIFT_COLOUR, "steps")
+        _draw_band(total, band(seeds, "return"), VANILLA_COLOUR, "return")
+        _draw_checkpoints(success, seeds, "success")
+        _draw_checkpoints(ratio, seeds, "path_ratio")
+        success.set_ylim(-0.03, 1.03)
+        if success.get_legend_handles_labels()[0]:
+            success.legend(frameon=False, fontsize=8, loc="lower right")
+        steps.set_title(title, color=INK, fontsize=10, loc="left")
+    figure.savefig(picture, dpi=DPI, pil_kwargs=SMALL)
 
 
 def draw_ablations(columns: Sequence[tuple[str, Arm]], picture: Path) -> None:
@@ -69,7 +75,7 @@ def draw_ablations(columns: Sequence[tuple[str, Arm]], picture: Path) -> None:
         for ax, (name, colour) in zip(axes[:, k], names, strict=True):
             _draw_band(ax, band(seeds, name), colour, name if k == 0 else "")
         axes[0, k].set_title(title, color=INK, fontsize=10, loc="left")
-    figure.savefig(picture, dpi=DPI)
+    figure.savefig(picture, dpi=DPI, pil_kwargs=SMALL)
 
 
 def draw_baseline(swift: Arm, vanilla: Arm, picture: Path) -> None:
@@ -84,7 +90,7 @@ def draw_baseline(swift: Arm, vanilla: Arm, picture: Path) -> None:
         _plain(ax, "ticks of the environment", label)
     axes[0, 0].set_ylim(-0.03, 1.03)
     axes[0, 0].legend(frameon=False, fontsize=8, loc="center right")
-    figure.savefig(picture, dpi=DPI)
+    figure.savefig(picture, dpi=DPI, pil_kwargs=SMALL)
 
 
 def draw_compared(world: World, arms: Sequence[tuple[str, Arm, str]], picture: Path) -> None:
@@ -99,7 +105,7 @@ def draw_compared(world: World, arms: Sequence[tuple[str, Arm, str]], picture: P
                 end = GOOD_COLOUR if flight["success"] else BAD_COLOUR
                 ax.plot(track[-1:, 1], track[-1:, 0], "o", color=end, ms=3, zorder=6)
         ax.set_title(title, color=INK, fontsize=10, loc="left")
-    figure.savefig(picture, dpi=DPI)
+    figure.savefig(picture, dpi=DPI, pil_kwargs=SMALL)
 
 
 def draw_episodes(world: World, arms: Sequence[tuple[str, SeedRows]], picture: Path) -> None:
@@ -115,7 +121,7 @@ def draw_episodes(world: World, arms: Sequence[tuple[str, SeedRows]], picture: P
         ax.set_title(title, color=INK, fontsize=10, loc="left")
         if shown:
             ax.legend(frameon=True, framealpha=0.85, edgecolor="none", fontsize=7, loc="lower right")
-    figure.savefig(picture, dpi=DPI)
+    figure.savefig(picture, dpi=DPI, pil_kwargs=SMALL)
 
 
 def draw_arms(figures: Mapping[str, Mapping[str, Interval | None]], picture: Path) -> None:
@@ -139,7 +145,7 @@ def draw_arms(figures: Mapping[str, Mapping[str, Interval | None]], picture: Pat
     axes[0, 0].set_ylim(len(names) - 0.5, -0.5)
     for ax in axes[0, 1:3]:
         ax.set_xlim(-0.03, 1.03)
-    figure.savefig(picture, dpi=DPI)
+    figure.savefig(picture, dpi=DPI, pil_kwargs=SMALL)
 
 
 def _draw_band(ax: Any, curve: Band, colour: str, label: str) -> None:
@@ -148,6 +154,21 @@ def _draw_band(ax: Any, curve: Band, colour: str, label: str) -> None:
     ax.fill_between(curve.episode, curve.low, curve.high, color=colour, alpha=0.2, lw=0)
     ax.plot(curve.episode, curve.mean, color=colour, lw=1.8)
     _plain(ax, "episode", label)
+
+
+def _draw_checkpoints(ax: Any, seeds: Arm, key: str) -> None:
+    """Greedy flights during training, a line a seed; policies that learn nothing as levels."""
+    for seed in seeds:
+        rows = [row for row in seed.evaluations if row.get(GREEDY, {}).get(key) is not None]
+        points = [(row["episode"], row[GREEDY][key]) for row in rows]
+        if points:
+            ax.plot(*zip(*points, strict=True), color=POLICY_COLOURS[GREEDY], lw=1.0, alpha=0.7, marker="o", ms=2)
+    for name, colour in POLICY_COLOURS.items():
+        levels = [row[name][key] for seed in seeds for row in seed.evaluations[:1] if name in row]
+        levels = [level for level in levels if level is not None]
+        if name != GREEDY and levels:
+            ax.axhline(float(np.mean(levels)), color=colour, lw=1.2, ls="--", label=name)
+    _plain(ax, "episode", f"greedy {key.replace('_', ' ')}")
 
 
 def _draw_over_ticks(ax: Any, seeds: Arm, value: Callable[[dict[str, Any]], float], colour: str, name: str) -> None:

@@ -28,7 +28,7 @@ def write_arm(out: Path, table: Table, name: str, seeds: int, episodes: int, goo
         tracks = [{"episode": row["episode"], "track_ne_m": row.pop("track_ne_m")} for row in rows]
         _write_rows(folder / "episodes.jsonl", rows)
         _write_rows(folder / "tracks.jsonl", tracks)
-        _write_rows(folder / "evaluations.jsonl", [])
+        _write_rows(folder / "evaluations.jsonl", [_evaluation(k, good * min(1.0, k / 80)) for k in (0, 50, 100)])
         finish(folder, seed, rows, [_row(rng, 1, good) | {"gained_m": 54.0, "turning_deg_per_m": 3.0}])
 
 
@@ -65,6 +65,13 @@ def _row(rng: np.random.Generator, episode: int, skill: float) -> dict[str, Any]
         "rl_time_s": steps / 20,
         "track_ne_m": track.tolist(),
     }
+
+
+def _evaluation(episode: int, skill: float) -> dict[str, Any]:
+    row: dict[str, Any] = {"episode": episode, "greedy": {"success": skill, "path_ratio": 1.8 - 0.7 * skill}}
+    if episode == 0:
+        row |= {"straight": {"success": 0.0, "path_ratio": None}, "random": {"success": 0.2, "path_ratio": 2.0}}
+    return row
 
 
 def _write_rows(path: Path, rows: list[dict[str, Any]]) -> None:

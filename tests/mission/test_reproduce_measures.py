@@ -27,7 +27,7 @@ def _row(episode: int, steps: int = 100, success: bool = True, **others: Any) ->
 
 def _seed(rows: list[dict[str, Any]]) -> SeedRows:
     tracks = {row["episode"]: np.array([[0.0, 0.0], [50.0, 0.0]]) for row in rows}
-    return SeedRows(1, rows, tracks, [], None, {}, None)
+    return SeedRows(1, rows, tracks, [], [], None, {}, None)
 
 
 def test_a_curve_is_told_by_its_first_and_last_fifteen_episodes() -> None:
@@ -66,7 +66,7 @@ def test_greedy_flights_count_paths_of_successes_only(tmp_path: Path) -> None:
     assert rows.done
     flights = [_row(1) | {"gained_m": 50.0, "turning_deg_per_m": 2.0}, _row(2, success=False) | {"gained_m": 0.0}]
     flights[1]["turning_deg_per_m"] = None
-    figures = figures_of(SeedRows(1, rows.episodes, rows.tracks, flights, 3.0, {}, {"seconds": {}}), Until(), GOAL)
+    figures = figures_of(SeedRows(1, rows.episodes, rows.tracks, [], flights, 3.0, {}, {"seconds": {}}), Until(), GOAL)
     assert figures["greedy_success"] == 0.5
     assert figures["greedy_path_ratio"] == 1.2
     assert figures["greedy_detour"] == pytest.approx((1.2 + 60.0) / 2)  # gaining nothing counts as a metre
