@@ -75,6 +75,7 @@ def question(engaged: Engagement, state: VehicleState, percept: Percept, task: T
         _prefix(engaged, state, params),
         observation(state, obstacles_ne_m, engaged.start_ne_m, task.goal_ned_m),
         engaged.start_ne_m,
+        task.cruise_m_s,
     )
 
 
@@ -102,8 +103,9 @@ def settle(
     if params.policy.guard and params.policy.name != GeometricExpert.name:
         expert, way = _expert(params.expert, params).propose(query, memory.guard)
         theirs = replace(asked, proposal_ned_m=None if expert is None else expert.waypoints_ne_m, others_ned_m=())
+        pace = guard.Pace(query.cruise_m_s, params.limits)
         theirs_verdict = check(theirs, params.checker)
-        guarded = guard.steps_in(verdict, theirs_verdict, way, asked, params.policy.guard_ratio)
+        guarded = guard.steps_in(verdict, theirs_verdict, way, asked, pace, params.policy.guard_ratio)
         verdict = theirs_verdict if guarded else verdict
     if verdict.path_ned_m is None:
         escape = _escape(state.pos_ned_m[:2], query.goal_ne_m, percept, params)

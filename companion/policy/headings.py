@@ -13,7 +13,10 @@ from companion.policy.goal_frame import goal_frame
 from companion.policy.interface import Proposal, Query
 
 HEADINGS = 41
-NEXT_CHOICES = 13  # behind the best
+NEXT_HEADINGS = 13  # behind the best
+ASIDE = (0.0, 1.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0, -2.0 / 3.0)  # of the step between headings: gaps are narrower than it
+SHORT = 0.6  # of a path's length: as far as the gap's mouth, where the whole path does not fit through yet
+NEXT_CHOICES = 2 * len(ASIDE) - 1 + NEXT_HEADINGS
 LASTS_S = 0.8  # a straight path is replaced after this long: at 0.4 s flights were as long, at 3 s a tenth longer
 SHORTEST_M = 1.0  # chord of a teacher's path that its heading is read from, at least
 STEP_M = 0.25
@@ -25,11 +28,15 @@ def headings_rad(params: DecoderParams) -> F64:
 
 
 def ranked(logits: F64, query: Query, params: DecoderParams) -> tuple[Proposal, float]:
-    """Straight paths along the best heading, refined, and along the next ones; and the best heading."""
+    """Straight paths along the best heading, refined; close by it, shorter, along the next ones; and that heading."""
     headings = headings_rad(params)
-    order = np.argsort(-logits, kind="stable")[: NEXT_CHOICES + 1].tolist()
+    order = np.argsort(-logits, kind="stable")[: NEXT_HEADINGS + 1].tolist()
     best = refined(logits, order[0], headings)
-    paths = [arc(heading, 0.0, params.headings_m, query, params) for heading in (best, *headings[order[1:]].tolist())]
+    close_by = [best + share * float(headings[1] - headings[0]) for share in ASIDE]
+    whole_m, next_best = params.headings_m, headings[order[1:]].tolist()
+    choices = [(heading, length_m) for length_m in (whole_m, SHORT * whole_m) for heading in close_by]
+    choices += [(heading, whole_m) for heading in next_best]
+    paths = [arc(heading, 0.0, length_m, query, params) for heading, length_m in choices]
     first, *others = (joined(query, path) for path in paths)
     return Proposal(first, tuple(others), LASTS_S), best
 

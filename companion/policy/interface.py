@@ -21,6 +21,7 @@ class Query:
     prefix_ne_m: F64  # (k, 2) already committed: ends where the new path has to begin, k = 1 is the vehicle's place
     observation: F64  # (72,)
     start_ne_m: F64  # (2,) where OFFBOARD began: the line to the goal starts there
+    cruise_m_s: float = 3.0  # cap of the horizontal speed
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from companion.navigator.decide import policy_named
 from companion.policy import store
 from companion.policy.actor import Actor, from_arrays
 from companion.policy.interface import Query
+from companion.policy.headings import NEXT_CHOICES
 from companion.policy.learned import LearnedPolicy, PolicySpec
 from companion.policy.observations import SIZES
 from companion.policy.store import Card, PolicyError, load_policy, save_policy
@@ -62,7 +63,7 @@ def test_a_saved_policy_flies_as_before(folder: Path) -> None:
 def test_a_ranking_policy_proposes_next_choices_too(tmp_path: Path) -> None:
     save_policy(tmp_path / "h", actor((SIZES["corridors"], 16, 41)), Card("h", PolicySpec("corridors", "headings")))
     offered, _ = load_policy(str(tmp_path / "h"), MAP).propose(asked(), None)
-    assert offered is not None and len(offered.others_ne_m) == 13
+    assert offered is not None and len(offered.others_ne_m) == NEXT_CHOICES
 
 
 def test_numbers_that_are_not_finite_are_no_proposal() -> None:
