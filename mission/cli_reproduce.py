@@ -61,7 +61,7 @@ def reproduce(
     if not found.arms:
         raise InputError(f"'{folder}' holds no reproduction")
     pictures = draw_all(found, folder)
-    again = _again(only, count, quick)
+    again = _again(only, arms, count, quick)
     documents = [write_readme(found, pictures, folder, again)]
     if docs:
         documents.append(write_docs(found, pictures, DOCS, again))
@@ -119,6 +119,8 @@ def _print(found: "Findings", documents: Sequence[Path]) -> None:
         console.print(f"written: {path}", markup=False)
 
 
-def _again(only: str | None, seeds: int, quick: bool) -> str:
-    words = ["swiftnav", "reproduce", *(["--only", only] if only else []), "--seeds", str(seeds)]
+def _again(only: str | None, arms: Path | None, seeds: int, quick: bool) -> str:
+    """The command that trains the same once more."""
+    table = ["--arms", str(arms)] if arms else []
+    words = ["swiftnav", "reproduce", *table, *(["--only", only] if only else []), "--seeds", str(seeds)]
     return shlex.join([*words, *(["--quick"] if quick else [])])
