@@ -46,8 +46,8 @@ METHOD = """## How it was done
 - Every arm trains until 100 successes or its limit of episodes; a seed of the baseline ends with the ticks that the
   same seed of SWIFT-Nav used. After it each seed flies greedily, in the arm's own environment.
 - An episode ends above the goal, and any contact ends it; flights in which RL mode is never entered are not counted.
-- The baseline commands velocity and yaw rate at 5 Hz, with no arbiter, checker or guidance; it has arrived within 2 m of
-  the goal, where SWIFT-Nav has to begin its landing within 0.5 m.
+- The baseline commands velocity and yaw rate at 5 Hz, with no arbiter, checker or guidance. It has arrived within 2 m
+  of the goal; SWIFT-Nav has to begin its landing within 0.5 m.
 - No-Stability: hysteresis, debounce and dwell off, line of sight stays. No-Checker: proposals are flown as they are;
   the limits on speed and the stop rule stay. A switch beyond the bound is one that full stability would not allow.
 """
