@@ -143,7 +143,7 @@ def test_a_ranking_gives_the_best_path_and_the_next_thirteen(seed: int) -> None:
     assert abs(best - ways[order[0]]) <= (ways[1] - ways[0]) / 2 + 1e-9
     assert len(offered.others_ne_m) == headings.NEXT_CHOICES
     assert all(path.shape == (6, 2) for path in (offered.waypoints_ne_m, *offered.others_ne_m))
-    towards = offered.others_ne_m[0][-1] - asked.prefix_ne_m[-1]
+    towards = offered.others_ne_m[-headings.NEXT_HEADINGS][-1] - asked.prefix_ne_m[-1]
     goal = math.atan2(-0.1, 19.3)
     assert math.remainder(math.atan2(towards[1], towards[0]) - goal - ways[order[1]], math.tau) == pytest.approx(0.0)
     image, turned = headings.ranked(headings.mirror_logits(logits), mirrored(asked), P)

@@ -15,8 +15,8 @@ from companion.navigator import Params
 from companion.navigator.decide import policy_named
 from companion.policy import store
 from companion.policy.actor import Actor, from_arrays
-from companion.policy.interface import Query
 from companion.policy.headings import NEXT_CHOICES
+from companion.policy.interface import Query
 from companion.policy.learned import LearnedPolicy, PolicySpec
 from companion.policy.observations import SIZES
 from companion.policy.store import Card, PolicyError, load_policy, save_policy
