@@ -32,7 +32,9 @@ class PolicyParams:
 
     name: str = param("geometric", "SN_POLICY", "Policy that proposes waypoints")
     guard: bool = param(True, "SN_PO_GUARD", "A learned policy's path is flown only while the expert's is no better")
-    guard_ratio: float = param(1.0, "SN_PO_G_RATIO", "So much longer may the policy's way take", "", 0.5, 3.0)
+    guard_ratio: float = param(
+        0.95, "SN_PO_G_RATIO", "Share of the time of the expert's way that the policy's may take", "", 0.5, 3.0
+    )
     horizon_s: float = param(0.4, "SN_PO_HORIZON", "The expert plans a path older than this anew", "s", 0.05, 10.0)
     learned_horizon_s: float = param(3.0, "SN_PO_L_HORIZON", "The same for a learned policy", "s", 0.05, 10.0)
     retry_s: float = param(0.2, "SN_PO_RETRY", "Least time between two decisions", "s", 0.0, 5.0)
