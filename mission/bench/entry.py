@@ -12,6 +12,7 @@ import numpy as np
 from companion import navigator
 from companion.app.profiles import profile_named
 from companion.core import params as core_params
+from companion.policy.store import digest_of, shipped
 from mission.bench.course import Course
 from mission.bench.flight import End, Flown, fly
 from mission.bench.pictures import draw_failure
@@ -39,6 +40,7 @@ class Entry:
         """What must be the same for runs to be counted together."""
         return {
             "pilot": self.pilot,
+            "policy_sha256": digest_of(self.pilot) if self.pilot in shipped() else None,
             "profile": self.profile,
             "stress": self.stress,
             "profile_params": profile_named(self.profile) if self.profile is not None else {},

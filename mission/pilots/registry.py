@@ -1,11 +1,14 @@
-"""Which pilots are there, and which one has this name?"""
+"""Which pilots are there, and which one has this name? A shipped policy is one as well, with the navigator round it."""
 
 from collections.abc import Callable
 from importlib import import_module
 
+from companion.core.gridmap import MapParams
 from companion.core.params import nearest
+from companion.policy.store import load_policy, shipped
 from mission.errors import InputError
 from mission.pilots.interface import Pilot
+from mission.pilots.swiftnav import SwiftNav
 
 # Name, then module and factory: a pilot is imported when it is asked for.
 PILOTS: dict[str, tuple[str, str]] = {
@@ -21,7 +24,8 @@ PILOTS: dict[str, tuple[str, str]] = {
 
 def pilot_names() -> list[str]:
     """The pilots that can fly here, in the order of the tables."""
-    return [name for name in PILOTS if name not in grounded()]
+    lacking = grounded()
+    return [name for name in (*PILOTS, *shipped()) if name not in lacking]
 
 
 def grounded() -> dict[str, str]:
@@ -36,9 +40,13 @@ def grounded() -> dict[str, str]:
 
 
 def pilot_named(name: str) -> Pilot:
-    """The pilot of that name. Raises InputError with the nearest name, or with what it lacks."""
+    """The pilot of that name. Raises InputError with the nearest name, or with what it lacks; PolicyError."""
     if name not in PILOTS:
-        raise InputError(f"unknown pilot '{name}'{nearest(name, list(PILOTS))}")
+        known = shipped()
+        if name not in known:
+            raise InputError(f"unknown pilot '{name}'{nearest(name, [*PILOTS, *known])}")
+        load_policy(name, MapParams())  # what may not fly is told before anything does
+        return SwiftNav(name)
     module, factory = PILOTS[name]
     make: Callable[[], Pilot] = getattr(import_module(module), factory)
     return make()

@@ -16,8 +16,12 @@ from companion.core.inputs import Inputs
 from companion.core.task import Task
 from companion.core.types import AutopilotStatus, LandedState, VehicleState
 from companion.navigator import Params
+from companion.policy import store
 from companion.policy.actor import Actor
+from companion.policy.learned import PolicySpec
+from companion.policy.observations import SIZES
 from mission.bench.course import Course, Rules
+from mission.bench.entry import Entry
 from mission.bench.flight import End, Flown, fly
 from mission.errors import InputError
 from mission.pilots.interface import Oracle, Pilot
@@ -148,12 +152,29 @@ def test_an_oracle_flies_only_where_it_is_told_the_world() -> None:
 
 
 def test_the_registry_names_what_can_fly_and_says_what_the_others_lack(tmp_path: Path) -> None:
-    assert {*pilot_names(), *grounded()} == set(PILOTS)
+    assert {*pilot_names(), *grounded()} == {*PILOTS, *store.shipped()}
     assert {*CLASSICAL, "geometric"} <= set(pilot_names())
     with pytest.raises(InputError, match="did you mean 'astar'"):
         pilot_named("a_star")
     with pytest.raises(InputError, match="no trained policy"):
         Td3Vanilla(tmp_path)
+
+
+def test_a_shipped_policy_is_a_pilot_whose_weights_are_part_of_what_was_flown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store, "POLICIES", tmp_path)
+    flown = []
+    for number in (0.0, 0.1):
+        actor = Actor((np.full((10, SIZES["goal"]), number, np.float32),), (np.zeros(10, np.float32),))
+        store.save_policy(tmp_path / "learned", actor, store.Card("learned", PolicySpec("goal")))
+        flown.append(Entry("learned").settings()["policy_sha256"])
+    assert None not in flown and flown[0] != flown[1] == store.digest_of("learned")
+    assert pilot_names()[-1] == pilot_named("learned").name == "learned"
+    assert Entry("geometric").settings()["policy_sha256"] is None
+    (tmp_path / "learned" / "actor.safetensors").write_bytes(b"other weights")
+    with pytest.raises(store.PolicyError, match="sha256"):
+        pilot_named("learned")
 
 
 def test_a_low_level_policy_with_other_weights_is_refused(tmp_path: Path) -> None:
