@@ -21,6 +21,7 @@ from mission.training.metrics import rows_file
 from mission.training.run_folder import RunSpec, open_run
 from mission.training.scores import FlightFigures, summary
 from mission.training.seed_job import POLICY_FOLDER
+from mission.training.training_worlds import KINDS
 
 LAST = 50  # episodes of training whose success is told
 BASELINE_FLIGHTS = 20
@@ -61,7 +62,7 @@ def ship(shipment: Shipment, tell: OnFlights) -> dict[str, Any]:
 
 
 def seed_figures(run: Path, spec: RunSpec) -> dict[str, dict[str, float]]:
-    """Of every seed that was trained: episodes, successes, share of the last fifty, wall time."""
+    """Of every seed that was trained: episodes, successes, share of the last fifty, contacts."""
     figures = {}
     for seed in spec.seeds:
         rows = list(read_rows(rows_file(seed_folder(run, seed), "episodes")))
@@ -75,6 +76,12 @@ def seed_figures(run: Path, spec: RunSpec) -> dict[str, dict[str, float]]:
                 "contacts": contacts,
             }
     return figures
+
+
+def judged_in(world: str) -> str:
+    """Where a policy trained in ``world`` is judged: of a random kind the test split, which no training has seen."""
+    kind, *_ = world.split(":")
+    return kind if kind in KINDS else world
 
 
 def figures_of(flights: Sequence[FlightFigures]) -> dict[str, Any]:
@@ -93,12 +100,13 @@ def figures_of(flights: Sequence[FlightFigures]) -> dict[str, Any]:
 
 
 def _evaluation(shipment: Shipment, spec: RunSpec, policy: str, tell: OnFlights) -> dict[str, Any]:
+    world = judged_in(spec.world)
     few = min(BASELINE_FLIGHTS, shipment.flights)
     sets = {
-        "guard_off": (EvalSpec(policy, spec.world), shipment.flights),
-        "guard_on": (EvalSpec(policy, spec.world, guard=True), shipment.flights),
-        STRAIGHT: (EvalSpec(STRAIGHT, spec.world), few),
-        RANDOM: (EvalSpec(RANDOM, spec.world), few),
+        "guard_off": (EvalSpec(policy, world), shipment.flights),
+        "guard_on": (EvalSpec(policy, world, guard=True), shipment.flights),
+        STRAIGHT: (EvalSpec(STRAIGHT, world), few),
+        RANDOM: (EvalSpec(RANDOM, world), few),
     }
     evaluation = {}
     for name, (flown, count) in sets.items():

@@ -13,10 +13,11 @@ from companion.policy.learned import PolicySpec
 from companion.policy.store import Card, read_policy, save_policy
 from mission.errors import InputError
 from mission.training import ship as shipping
+from mission.training.flights import plan_in
 from mission.training.presets import load_preset
 from mission.training.run_folder import RunSpec, make_run
 from mission.training.scores import FlightFigures
-from mission.training.ship import Shipment, figures_of, ship
+from mission.training.ship import Shipment, figures_of, judged_in, ship
 from mission.training.until import Until
 
 FLOWN = FlightFigures(
@@ -56,6 +57,11 @@ def test_a_shipped_policy_carries_its_figures_with_guard_off_and_on(
     assert told == [("guard_off", 30), ("guard_on", 30), ("straight", 20), ("random", 20)]
     assert card.evaluation["guard_off"]["success"] == 1.0
     assert not {"decision_p50_ms", "decision_p99_ms"} & set(card.evaluation["guard_on"])
+
+
+def test_a_policy_of_random_worlds_is_judged_in_worlds_that_no_training_saw() -> None:
+    assert plan_in(judged_in("barrier:train:300"), 0).world.name == "barrier_test_0"
+    assert judged_in("trajectory1") == "trajectory1"
 
 
 def test_a_flight_that_lands_late_has_arrived_but_is_no_success() -> None:
