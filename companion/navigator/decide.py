@@ -105,7 +105,7 @@ def settle(
         theirs = replace(asked, proposal_ned_m=None if expert is None else expert.waypoints_ne_m, others_ned_m=())
         pace = guard.Pace(query.cruise_m_s, params.limits)
         theirs_verdict = check(theirs, params.checker)
-        guarded = guard.steps_in(verdict, theirs_verdict, way, asked, pace, params.policy.guard_ratio)
+        guarded = guard.steps_in(verdict, theirs_verdict, asked, pace, params.policy.guard_ratio)
         verdict = theirs_verdict if guarded else verdict
     if verdict.path_ned_m is None:
         escape = _escape(state.pos_ned_m[:2], query.goal_ne_m, percept, params)

@@ -1,9 +1,10 @@
 """Whose path is flown while the guard is on: the policy's, or that of the geometric expert? Pure; local NED.
 
 The expert's proposal is one more candidate of the checker. The policy's is flown where the checker keeps it as it is,
-with no less margin than the expert's, and where it is expected to arrive no later: flown to its end, and from there
-straight on to some later place of the expert's own way, free of everything remembered. A policy that takes the wrong
-side of an obstacle, or circles, is thus never followed; one that cuts a corner is.
+with no less margin than the expert's, and where it is expected to be quicker: flown to its end, and from there straight
+on to some place of the expert's own path, free of everything remembered. A policy that takes the wrong side of an
+obstacle, or circles, is thus never followed; one that cuts a corner is. Only the expert's path counts, not its way
+beyond: what has not been seen yet looks free from afar.
 
 What a way takes is reckoned with the limits that hold in flight: slower beside obstacles, slower in corners.
 """
@@ -17,34 +18,32 @@ from companion.core import geometry
 from companion.core.types import F64
 from companion.guidance.limits import LimitsParams
 
-REJOIN_M = 1.0  # places of the expert's way that are tried, this far apart
+REJOIN_M = 1.0  # places of the expert's path that are tried, this far apart
 STEP_M = 0.25  # between two places of a way whose clearance is looked at
 
 
-def steps_in(
-    policy: Verdict, guard: Verdict, way_ne_m: F64 | None, asked: CheckQuery, pace: "Pace", ratio: float
-) -> bool:
+def steps_in(policy: Verdict, guard: Verdict, asked: CheckQuery, pace: "Pace", ratio: float) -> bool:
     """Is the expert's path flown rather than the policy's?
 
     Args:
         policy: what the checker made of the policy's proposal.
         guard: what it made of the expert's.
-        way_ne_m: (k, 2) the expert's whole way, from the anchor on; None: it has none.
         asked: what no path may touch, and how wide the vehicle is.
         pace: how fast what is flown.
         ratio: of the times that the two ways take, from which the expert's is flown.
     """
-    if guard.path_ned_m is None or guard.margin_m is None or way_ne_m is None or guard.kind is VerdictKind.ESCAPE:
+    if guard.path_ned_m is None or guard.margin_m is None or guard.kind is VerdictKind.ESCAPE:
         return False
     if policy.path_ned_m is None or policy.kind is not VerdictKind.KEPT or policy.margin_m is None:
         return True
     if policy.margin_m < guard.margin_m:
         return True
-    rest = _rest_from(policy.path_ned_m[-1], way_ne_m, asked.points_ned_m, asked.radius_m + policy.margin_m)
+    radius_m = asked.radius_m + policy.margin_m
+    rest = _rest_from(policy.path_ned_m[-1], guard.path_ned_m, asked.points_ned_m, radius_m)
     if rest is None:
         return True
-    theirs = _beyond(guard.path_ned_m[-1], way_ne_m)
-    return pace.flight_s(policy.path_ned_m, rest, asked) > ratio * pace.flight_s(guard.path_ned_m, theirs, asked)
+    expert_s = pace.flight_s(guard.path_ned_m, guard.path_ned_m[-1:], asked)
+    return pace.flight_s(policy.path_ned_m, rest, asked) > ratio * expert_s
 
 
 class Pace:
@@ -93,14 +92,8 @@ class Pace:
         )
 
 
-def _beyond(end_ne_m: F64, way_ne_m: F64) -> F64:
-    """What is left of the expert's way where its path ends."""
-    rest = geometry.part(way_ne_m, geometry.project(way_ne_m, end_ne_m).s_m)
-    return np.concatenate([end_ne_m[None], rest[1:]])
-
-
 def _rest_from(end_ne_m: F64, way_ne_m: F64, points_ne_m: F64, radius_m: float) -> F64 | None:
-    """Shortest way on from ``end`` over a place of the expert's way that it sees; None if it sees none."""
+    """Shortest way on from ``end`` over a place of the expert's path that it sees; None if it sees none."""
     whole = geometry.length(way_ne_m)
     best, best_s_m = math.inf, None
     for place, s_m in _places(way_ne_m, whole):
@@ -114,7 +107,7 @@ def _rest_from(end_ne_m: F64, way_ne_m: F64, points_ne_m: F64, radius_m: float) 
 
 
 def _places(way_ne_m: F64, whole_m: float) -> list[tuple[F64, float]]:
-    """Places of the way, the last first, and how far along they are."""
+    """Places of a path, the last first, and how far along they are."""
     count = max(1, math.ceil(whole_m / REJOIN_M))
     steps = [whole_m * k / count for k in range(count, -1, -1)]
     return [(geometry.point_at(way_ne_m, s_m), s_m) for s_m in steps]
