@@ -103,7 +103,12 @@ def all_suites(
     json: Json = False,
 ) -> None:
     """Every suite with every pilot; BARN only with --worlds."""
+    require_extra("sitl", "bench all")
     names = [*SUITES, *(["barn"] if worlds is not None else [])]
+    if worlds is not None:
+        from mission.bench.run import SuiteSpec
+
+        SuiteSpec("barn", worlds, part).load()  # hours before its turn
     for name in names:
         _fly(name, worlds, part, Asked(pilot, runs, jobs, "none", profile, param, stiff, out, json))
 

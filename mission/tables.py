@@ -6,7 +6,6 @@ asked for. Every row can be flown alone, over MAVLink: ``swiftnav fly MISSION --
 
 import itertools
 import math
-import multiprocessing
 import statistics
 import sys
 import tempfile
@@ -27,6 +26,7 @@ from mission.cli_options import Json, print_json
 from mission.errors import InputError
 from mission.flight_plan import FlightPlan, plan_flight
 from mission.judge import Result, judge
+from mission.side_by_side import side_by_side
 from mission.simulate import fly_in_process
 from mission.world_generator import forest100
 from sitl.truth_log import TruthFile
@@ -87,8 +87,7 @@ def fly_rows(mission: str, seeds: Sequence[int], jobs: int = 1) -> Iterator[Resu
     if jobs == 1:
         yield from itertools.starmap(fly_row, work)
         return
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        yield from pool.imap(_fly_item, work)
+    yield from side_by_side(_fly_item, work, jobs)
 
 
 def summary(name: str, results: list[Result]) -> dict[str, Any]:

@@ -83,4 +83,6 @@ def _length_of(path: Path) -> float:
         raise WorldError(f"{path.name} is no NumPy array: {error}") from error
     if cells.ndim != 2 or cells.shape[1] != 2 or len(cells) == 0 or not np.issubdtype(cells.dtype, np.number):
         raise WorldError(f"{path.name}: rows of (row, column) are wanted, got shape {cells.shape}")
+    if not np.isfinite(cells).all():
+        raise WorldError(f"{path.name} holds a number that is not finite")
     return reference_length_m(cells.astype(np.float64))

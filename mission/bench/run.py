@@ -6,7 +6,6 @@ runs of other settings are never mixed in) and ``failures/``. Interrupt at any t
 
 import dataclasses
 import json
-import multiprocessing
 import os
 import platform
 import subprocess
@@ -21,6 +20,7 @@ from mission.bench.entry import Entry, fly_run
 from mission.bench.rows import Row
 from mission.bench.suites import Suite, suite_named
 from mission.errors import InputError
+from mission.side_by_side import side_by_side
 
 RUNS, SETUP, FAILURES = "runs.csv", "setup.json", "failures"
 
@@ -72,8 +72,11 @@ def fly_missing(
     spec: SuiteSpec, suite: Suite, entry: Entry, folder: Path, runs: int | None = None, jobs: int = 1
 ) -> Iterator[Row]:
     """Fly what is missing, append each row as it ends and hand it over. Raises InputError for other settings there."""
-    folder.mkdir(parents=True, exist_ok=True)
-    _claim(folder / SETUP, spec, entry)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        _claim(folder / SETUP, spec, entry)
+    except OSError as error:
+        raise InputError(f"--out: {error.filename or folder}: {error.strerror}") from error
     todo = missing(suite, runs, rows.read(folder / RUNS))
     entry = dataclasses.replace(entry, pictures=folder / FAILURES)
     for row in _flown(suite, entry, todo, jobs):
@@ -120,7 +123,7 @@ def _claim(path: Path, spec: SuiteSpec, entry: Entry) -> None:
     """Write down what is flown here; what lies here already must be the same."""
     settings: dict[str, Any] = {"suite": spec.name, "part": spec.part, **entry.settings()}
     if path.is_file():
-        there = json.loads(path.read_text(encoding="utf-8"))
+        there = _setup(path)
         for key, value in settings.items():
             if there.get(key) != value:
                 raise InputError(
@@ -135,6 +138,16 @@ def _claim(path: Path, spec: SuiteSpec, entry: Entry) -> None:
     part.replace(path)  # whole or not at all
 
 
+def _setup(path: Path) -> dict[str, Any]:
+    try:
+        there = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {error}; choose another --out") from error
+    if not isinstance(there, dict):
+        raise InputError(f"{path} holds no settings; choose another --out")
+    return there
+
+
 def _flown(suite: Suite, entry: Entry, todo: list[Job], jobs: int) -> Iterator[Row]:
     state = commit()
     if jobs == 1 or len(todo) <= 1:
@@ -142,8 +155,7 @@ def _flown(suite: Suite, entry: Entry, todo: list[Job], jobs: int) -> Iterator[R
             yield fly_run(suite.cells[job.cell].course(job.run), job.run, entry, state)
         return
     arguments = (suite, entry, state)
-    with multiprocessing.get_context("spawn").Pool(min(jobs, len(todo)), _set_up, arguments) as pool:
-        yield from pool.imap_unordered(_fly, todo)
+    yield from side_by_side(_fly, todo, jobs, _set_up, arguments, in_order=False)
 
 
 @dataclass(slots=True)

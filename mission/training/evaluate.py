@@ -5,7 +5,6 @@ Take-off to touchdown, success as the mission asks for it. A flight is a functio
 
 import functools
 import math
-import multiprocessing
 import tempfile
 import time
 from collections import Counter
@@ -25,6 +24,7 @@ from mission.flight_log import TruthLog, read_truth
 from mission.flight_plan import FlightPlan
 from mission.judge import Flown, failure_of, measure
 from mission.shortest_path import shortest_path_m
+from mission.side_by_side import side_by_side
 from mission.simulate import InProcessFlight, fly_in_process
 from mission.tables import TIMED_OUT
 from mission.training.baselines import policy_for
@@ -92,8 +92,7 @@ def fly_many(spec: EvalSpec, seeds: Sequence[int], jobs: int = 1) -> Iterator[Fl
     if jobs == 1:
         yield from (fly_one(spec, seed) for seed in seeds)
         return
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        yield from pool.imap(functools.partial(fly_one, spec), seeds)
+    yield from side_by_side(functools.partial(fly_one, spec), seeds, jobs)
 
 
 def fly_one(spec: EvalSpec, seed: int) -> FlightFigures:

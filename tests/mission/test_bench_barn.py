@@ -55,14 +55,17 @@ def test_worlds_that_cannot_be_flown_are_skipped_named_and_counted(tmp_path):
     barn_folder(tmp_path, sdf(mesh), 3)
     barn_folder(tmp_path, sdf(*wall), 4)
     barn_folder(tmp_path, sdf(model("a", "-1.5 6.0 0 0 0 0", CYLINDER)), 5, path=False)
+    barn_folder(tmp_path, sdf(model("a", "-1.5 6.0 0 0 0 0", CYLINDER)), 6)
+    np.save(tmp_path / "path_6.npy", np.full((2, 2), np.nan))
     barn = load_barn(tmp_path)
     assert [course.name for course in barn.courses] == ["barn_1"]
     reasons = {skipped.name: skipped.reason for skipped in barn.skipped}
-    assert list(reasons) == [f"world_{n}.world" for n in (2, 3, 4, 5)]
+    assert list(reasons) == [f"world_{n}.world" for n in (2, 3, 4, 5, 6)]
     assert "world_2.world is no SDF" in reasons["world_2.world"]
     assert "model 'rock' is a <mesh> (model://rock.dae)" in reasons["world_3.world"]
     assert "goal is not reachable" in reasons["world_4.world"]
     assert "path_5.npy is missing" in reasons["world_5.world"]
+    assert "path_6.npy holds a number that is not finite" in reasons["world_6.world"]
 
 
 def test_where_no_world_can_be_flown_the_first_reason_is_said(tmp_path):

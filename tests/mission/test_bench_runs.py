@@ -154,6 +154,19 @@ def test_runs_of_other_settings_are_never_mixed_in(tmp_path):
         list(fly_missing(spec, suite, other, tmp_path / "x"))
 
 
+@pytest.mark.parametrize("text", ["{", "[1]", "\ud800"])
+def test_settings_that_cannot_be_read_are_one_line(tmp_path, text):
+    (tmp_path / "setup.json").write_text(text, encoding="utf-8", errors="surrogatepass")
+    with pytest.raises(InputError, match=r"setup\.json .*choose another --out"):
+        list(fly_missing(SuiteSpec("gap"), Suite("gap", "", (), 1), Entry(), tmp_path))
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
+    (tmp_path / "mine").touch()
+    with pytest.raises(InputError, match=r"--out: .*mine/x: Not a directory"):
+        list(fly_missing(SuiteSpec("gap"), Suite("gap", "", (), 1), Entry(), tmp_path / "mine" / "x"))
+
+
 def test_a_failed_run_leaves_a_picture(tmp_path):
     entry = Entry(pictures=tmp_path)
     failed = fly_run(open_course(time_limit_s=0.5), 3, entry, "abc")
@@ -202,6 +215,7 @@ def test_one_object_a_suite_for_machines_and_a_document_from_what_was_flown(tmp_
         (["pole", "--profile", "tigth"], "did you mean 'tight'"),
         (["pole", "--param", "limits.tua_s=1"], "unknown parameter"),
         (["barn", "nowhere"], "is no folder"),
+        (["all", "--worlds", "nowhere"], "is no folder"),
     ],
 )
 def test_mistakes_are_one_line_and_nothing_is_flown(words, said, tmp_path, capsys):
