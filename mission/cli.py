@@ -16,6 +16,7 @@ from mission.cli_fly import fly
 from mission.cli_params import app as params_app
 from mission.cli_reproduce import reproduce
 from mission.cli_ship import ship
+from mission.cli_ship_clone import ship_clone
 from mission.cli_sitl import sitl
 from mission.cli_train import train
 from mission.cli_worlds import app as worlds_app
@@ -40,6 +41,7 @@ app.command(epilog="Example: swiftnav clone --world mixed:train --rounds 5 --fli
 app.command(epilog="Example: swiftnav reproduce --only t1,t2 --seeds 5 --jobs 2 --out reproduce")(reproduce)
 app.command("eval", epilog="Example: swiftnav eval geometric --world barrier --episodes 60 --json")(evaluate)
 app.command(epilog="Example: swiftnav ship runs/RUN --seed 3 --name trajectory2")(ship)
+app.command("ship-clone", epilog="Example: swiftnav ship-clone runs/forest --name forest --episodes 20")(ship_clone)
 app.command(epilog="Example: swiftnav export trajectory2 --onnx trajectory2.onnx")(export)
 app.add_typer(worlds_app, name="worlds")
 app.add_typer(params_app, name="params")
