@@ -1,4 +1,4 @@
-"""Which libraries does a part of the project need? Prints what a pyproject.toml asks for: requirements.py FILE [EXTRA]."""
+"""Which libraries does a part of the project need? Prints what a pyproject.toml asks for: FILE [EXTRA ...]."""
 
 import sys
 import tomllib
