@@ -14,6 +14,30 @@ from mission.training.fleet import seed_folder
 from mission.training.trainer import RESULT
 
 GOAL_NE_M = (54.0, 0.0)
+TINY = """
+until: {successes: 9, episodes: 3}
+flights: 1
+arms:
+  t1:
+    group: paper
+    text: SWIFT-Nav
+    world: trajectory1
+    settings: &tiny
+      env.time_limit_s: 6.0
+      td3.hidden: [8, 8]
+      training.batch: 4
+      training.warmup_decisions: 2
+      training.checkpoint_every: 1
+      training.evaluate_every: 0
+  vanilla:
+    group: paper
+    text: vanilla
+    world: trajectory1
+    settings:
+      <<: *tiny
+      env.low_level: true
+    ticks_of: t1
+"""
 
 
 def write_arm(out: Path, table: Table, name: str, seeds: int, episodes: int, good: float = 1.0) -> None:

@@ -5,15 +5,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from reproduce_kit import finish, write_arm
+from reproduce_kit import TINY, finish, write_arm
 
 from mission.errors import InputError
 from mission.reproduce import run
 from mission.reproduce.arms import load_table
 from mission.reproduce.document import text_of, write_docs, write_readme
 from mission.reproduce.findings import findings
+from mission.reproduce.measures import read_seed
 from mission.reproduce.pictures import Picture, draw_all
-from mission.reproduce.run import Task, TaskJob, prepare, run_all, tasks_of
+from mission.reproduce.run import Task, TaskJob, arm_folder, prepare, run_all, tasks_of
 from mission.training.fleet import Member, OnUpdate
 from mission.training.run_folder import open_run
 from mission.training.until import UNLIMITED
@@ -54,6 +55,31 @@ def _run(out: Path, only: str, seeds: int) -> list[str]:
     arms = table.chosen(only)
     prepare(out, arms, range(1, seeds + 1))
     return run_all(out, table, arms, range(1, seeds + 1), 2, lambda members: None)
+
+
+def test_a_seed_broken_off_and_taken_up_again_ends_like_one_never_broken_off(tmp_path: Path) -> None:
+    (tmp_path / "tiny.yaml").write_text(TINY)
+    table = load_table(tmp_path / "tiny.yaml")
+    for arm in table.arms:
+        ends = []
+        for out in (tmp_path / "whole", tmp_path / "broken"):
+            prepare(out, [arm], (1,))
+            tasks = tuple(tasks_of(out, table, arm, (1,)))
+            if out.name == "broken":
+                assert next(TaskJob(tasks)(0, out)).progress.episodes == 1
+                assert not tasks[0].done
+            statuses = list(TaskJob(tasks)(0, out))
+            assert tasks[0].done
+            seed = read_seed(arm_folder(out, arm), 1)
+            assert seed.done
+            assert seed.result is not None
+            ends.append((statuses[-1].progress, seed.result["weights_sha256"], seed.episodes, seed.flights))
+        assert ends[0] == ends[1]
+    swift, vanilla = (read_seed(arm_folder(tmp_path / "whole", arm), 1).result for arm in table.arms)
+    assert swift is not None
+    assert vanilla is not None
+    longest = 6 * 25 + 1  # ticks of an episode at most
+    assert 0 <= vanilla["ticks"] - swift["ticks"] <= longest or vanilla["episodes"] == 3
 
 
 def test_what_is_done_is_not_done_again(tmp_path: Path, fleet: Fleet) -> None:
