@@ -24,7 +24,7 @@ from mission.training.seed_job import POLICY_FOLDER
 from mission.training.training_worlds import KINDS
 
 LAST = 50  # episodes of training whose success is told
-BASELINE_FLIGHTS = 20
+BASELINE_FLIGHTS = 10
 WALL = ("decision_p50_ms", "decision_p99_ms")  # of the machine, not of the policy
 SLOW = "took "  # what the judge says of a flight that landed at its goal too late
 OnFlights = Callable[[str, int], None]  # what is flown next, how often

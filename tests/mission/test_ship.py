@@ -54,7 +54,7 @@ def test_a_shipped_policy_carries_its_figures_with_guard_off_and_on(
     card, _ = read_policy(tmp_path / "trajectory1")
     assert card.name == "trajectory1"
     assert card.training["seeds"]["1"] == {"episodes": 4, "successes": 3, "last_50": 0.75, "contacts": 0}
-    assert told == [("guard_off", 30), ("guard_on", 30), ("straight", 20), ("random", 20)]
+    assert told == [("guard_off", 30), ("guard_on", 30), ("straight", 10), ("random", 10)]
     assert card.evaluation["guard_off"]["success"] == 1.0
     assert not {"decision_p50_ms", "decision_p99_ms"} & set(card.evaluation["guard_on"])
 
