@@ -29,6 +29,7 @@ from companion.policy.expert import GeometricExpert
 from companion.policy.learned import PolicySpec
 from companion.policy.observations import SIZES, observe, remember
 from companion.policy.store import Card, read_policy, save_policy
+from mission.errors import InputError
 from mission.training import bc
 from mission.training.bc import Clone, CloneConfig, Dataset
 from mission.training.checkpoint import write_whole
@@ -191,6 +192,8 @@ def _cloned(config: DaggerConfig, number: int, lessons: list[Lesson], folder: Pa
         card, actor = read_policy(folder)
         return Clone(actor, *(float(card.training[key]) for key in ("loss", "held_out_loss", "agreement")))
     told = [lesson for lesson in lessons if len(lesson.headings_rad)]
+    if not told:
+        raise InputError(f"no flight needed a decision: there is nothing to learn in '{config.world}'")
     clone_config = CloneConfig(observation=config.observation, hidden=config.hidden, steps=config.steps)
     result = bc.clone(dataset(told, spec.decoder_params, config.sigma_rad), clone_config, config.seed)
     training = {
