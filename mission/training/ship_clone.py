@@ -16,7 +16,6 @@ from companion.policy.store import POLICIES, read_policy, save_policy
 from mission.bench.run import commit
 from mission.errors import FlightError, InputError
 from mission.flight_log import read_rows
-from mission.training.configure import plain
 from mission.training.dagger_config import read_config
 from mission.training.evaluate import EvalSpec, fly_one
 from mission.training.scores import FlightFigures
@@ -56,7 +55,7 @@ def ship_clone(shipment: CloneShipment, tell: Callable[[int, int], None]) -> dic
         raise InputError(f"{folder}: not there: 'swiftnav clone --resume {shipment.run}' ends the training")
     card, actor = read_policy(folder)
     evaluation = _evaluation(shipment, str(folder), tell)
-    training = {**card.training, "settings": plain(config), "commit": commit()}
+    training = {**card.training, "commit": commit()}
     try:
         target = shipment.into / shipment.name
         save_policy(
