@@ -77,6 +77,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _complain(str(error), EXIT_BAD_INPUT)
     except FlightError as error:
         return _complain(str(error), EXIT_FAILED)
+    except OSError as error:  # a disk that is full, a folder that may not be written
+        text = error.strerror or str(error)
+        return _complain(f"{error.filename}: {text}" if error.filename else text, EXIT_FAILED)
     except KeyboardInterrupt:
         return _complain("interrupted", EXIT_INTERRUPTED)
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -28,6 +29,9 @@ def configured(kind: type[T], values: Any, where: str) -> T:
     for key in values:
         if key not in known:
             raise InputError(f"{where}: unknown key '{key}'{nearest(str(key), known)}")
+    for key, value in values.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise InputError(f"{where}: '{key}' = {value} wants a finite number")
     try:
         text = json.dumps(values, allow_nan=False)
         return TypeAdapter(kind).validate_json(text, strict=True)

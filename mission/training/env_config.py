@@ -29,6 +29,15 @@ NO_STABILITY = {  # hysteresis, debounce and dwell off: the smallest values that
 }
 HYSTERESIS = (("d_enter_m", "d_exit_m"), ("s_enter", "s_exit"))  # without it an exit lies this far beyond its entry:
 HAIR = 1e-6
+RANGES = {  # as for missions
+    "range_sigma_m": (0.0, 0.5),
+    "dropout": (0.0, 0.99),
+    "latency_s": (0.0, 1.0),
+    "scan_latency_s": (0.0, 1.0),
+    "spawn_jitter_m": (0.0, 10.0),
+    "cruise_m_s": (0.3, 15.0),
+}
+WIND_MAX_M_S = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +82,11 @@ class EnvConfig:
         reward_table(self.reward)
         if not 0.0 < self.discount_per_s <= 1.0:
             raise InputError(f"discount_per_s {self.discount_per_s} is outside (0, 1]")
+        for name, (least, most) in RANGES.items():
+            if not least <= getattr(self, name) <= most:
+                raise InputError(f"{name} {getattr(self, name)} is outside [{least:g}, {most:g}]")
+        if not 0.0 <= self.wind_m_s[0] <= self.wind_m_s[1] <= WIND_MAX_M_S:
+            raise InputError(f"wind_m_s {list(self.wind_m_s)} wants [low, high] in [0, {WIND_MAX_M_S:g}]")
         if not 0.0 < self.time_limit_s <= 3600.0:
             raise InputError(f"time_limit_s {self.time_limit_s} is outside (0, 3600]")
 

@@ -20,6 +20,8 @@ from mission.training.replay import KINDS, ReplayConfig
 from mission.training.td3 import TD3Config
 from mission.training.until import TrainingConfig
 
+CAPACITY_MAX = 10_000_000  # transitions: 6 GB
+
 
 @dataclass(frozen=True, slots=True)
 class MemoryConfig(ReplayConfig):
@@ -29,10 +31,13 @@ class MemoryConfig(ReplayConfig):
     capacity: int = 50_000
 
     def __post_init__(self) -> None:
+        ReplayConfig.__post_init__(self)  # super() is not to be had in a class with slots
         if self.kind not in KINDS:
             raise ValueError(f"'kind' = '{self.kind}'{nearest(self.kind, list(KINDS))}")
         if self.capacity < 1:
             raise ValueError(f"'capacity' = {self.capacity} wants at least 1")
+        if self.capacity > CAPACITY_MAX:
+            raise ValueError(f"'capacity' = {self.capacity} wants at most {CAPACITY_MAX}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,14 @@ class ReplayConfig:
     beta_last: float = 1.0
     beta_batches: int = 10_000  # sampled until beta is at its last
 
+    def __post_init__(self) -> None:
+        """Raise ValueError naming what is out of range."""
+        for name in ("alpha", "beta_first", "beta_last"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"'{name}' = {getattr(self, name)} is outside [0, 1]")
+        if self.beta_batches < 1:
+            raise ValueError(f"'beta_batches' = {self.beta_batches} wants at least 1")
+
 
 @dataclass(frozen=True, slots=True)
 class Batch:

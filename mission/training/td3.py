@@ -45,6 +45,25 @@ class TD3Config:
     zero_last: bool = True  # the untrained actor says zero
     device: str = "cpu"
 
+    def __post_init__(self) -> None:
+        """Raise ValueError naming what is out of range."""
+        if min(self.hidden, default=1) < 1:
+            raise ValueError(f"'hidden' = {list(self.hidden)} wants layers of at least 1")
+        if not 0.0 <= self.tau <= 1.0:
+            raise ValueError(f"'tau' = {self.tau} is outside [0, 1]")
+        for name, most in (("actor_rate", 1.0), ("critic_rate", 1.0), ("reward_scale", np.inf)):
+            if not 0.0 < getattr(self, name) <= most:
+                raise ValueError(f"'{name}' = {getattr(self, name)} is outside (0, {most:g}]")
+        for name, least in (
+            ("smoothing_sigma", 0),
+            ("smoothing_clip", 0),
+            ("saturation_penalty", 0),
+            ("actor_after", 0),
+            ("actor_every", 1),
+        ):
+            if not getattr(self, name) >= least:
+                raise ValueError(f"'{name}' = {getattr(self, name)} wants at least {least}")
+
 
 class TD3:
     """Actor, critics, their targets and optimisers."""

@@ -110,6 +110,17 @@ def test_a_port_in_use_is_one_clear_line(
     assert sorted(desk.rglob("*")) == before
 
 
+def test_a_file_that_cannot_be_written_is_one_clear_line(
+    desk: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device", "notes.txt")
+
+    monkeypatch.setattr(cli, "app", lambda *_, **__: full())
+    assert run("params list") == 1
+    assert capfd.readouterr().err == "swiftnav: notes.txt: No space left on device\n"
+
+
 def test_a_missing_extra_is_named(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(cli_options.EXTRA_MODULES, "sitl", ("jsbsim_that_is_not_there",))
     assert run("fly") == 2
