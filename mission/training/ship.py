@@ -26,6 +26,7 @@ from mission.training.training_worlds import KINDS
 LAST = 50  # episodes of training whose success is told
 BASELINE_FLIGHTS = 10
 WALL = ("decision_p50_ms", "decision_p99_ms")  # of the machine, not of the policy
+ENOUGH = 0.95  # success without the guard: less is said among the limits
 SLOW = "took "  # what the judge says of a flight that landed at its goal too late
 OnFlights = Callable[[str, int], None]  # what is flown next, how often
 
@@ -55,7 +56,9 @@ def ship(shipment: Shipment, tell: OnFlights) -> dict[str, Any]:
     training = {**card.training, "commit": commit(), "seeds": seed_figures(shipment.run, spec)}
     try:
         target = shipment.into / shipment.name
-        save_policy(target, actor, replace(card, name=shipment.name, training=training, evaluation=evaluation))
+        limits = (*card.limits, *limits_of(evaluation))
+        shipped = replace(card, name=shipment.name, training=training, evaluation=evaluation, limits=limits)
+        save_policy(target, actor, shipped)
     except OSError as error:
         raise FlightError(f"{shipment.into / shipment.name}: {error.strerror or error}") from error
     return evaluation
@@ -97,6 +100,20 @@ def figures_of(flights: Sequence[FlightFigures]) -> dict[str, Any]:
         "arrived_time_s": sum(times) / len(times) if times else None,
         "reasons": dict(reasons),
     }
+
+
+def limits_of(evaluation: dict[str, Any]) -> tuple[str, ...]:
+    """Where the figures fall short of flying every mission, in words."""
+    off = evaluation["guard_off"]
+    told = []
+    if off["success"] < ENOUGH:
+        told.append(
+            f"guard off, {off['success']:.0%} of {off['episodes']} flights are in time for the mission, "
+            f"{off['arrived']:.1%} land at the goal: fly it with the guard on"
+        )
+    if off["contact"] > 0.0:
+        told.append(f"guard off, {off['contact']:.1%} of the flights touch something")
+    return tuple(told)
 
 
 def _evaluation(shipment: Shipment, spec: RunSpec, policy: str, tell: OnFlights) -> dict[str, Any]:

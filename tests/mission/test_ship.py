@@ -72,6 +72,13 @@ def test_a_flight_that_lands_late_has_arrived_but_is_no_success() -> None:
     assert figures["reasons"] == {"took": 1, "contact": 1}
 
 
+def test_what_falls_short_is_named_among_the_limits() -> None:
+    assert shipping.limits_of({"guard_off": figures_of([FLOWN])}) == ()
+    late, touched = shipping.limits_of({"guard_off": figures_of([FLOWN, LATE, HIT])})
+    assert "33% of 3 flights are in time" in late and "66.7% land at the goal" in late
+    assert "33.3% of the flights touch something" in touched
+
+
 def test_a_seed_that_is_not_there_or_has_not_ended_is_told(run: Path) -> None:
     with pytest.raises(InputError, match="has no seed 7: it has 1, 2"):
         ship(Shipment(run, 7, "x"), lambda name, count: None)
