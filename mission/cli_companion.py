@@ -6,7 +6,7 @@ The arguments are the companion's, and argparse reads them as it does there: a g
 import argparse
 import dataclasses
 
-from companion.app.command_line import CRUISE_M_S, check_only, config_from, launch, parser, read_params
+from companion.app.command_line import CRUISE_M_S, check_only, config_from, launch, parser, told_params
 from companion.app.command_line import InputError as CompanionInputError
 from companion.core import params
 from companion.navigator import Params
@@ -31,7 +31,7 @@ def companion(arguments: list[str]) -> int:
         return check_only(given, tuned)
     try:
         config = config_from(given)
-        overrides = read_params(given.params) if given.params else {}
+        overrides = told_params(given)
     except CompanionInputError as error:
         raise InputError(str(error)) from error
     return launch(dataclasses.replace(config, params=params.update(tuned, overrides)), given)

@@ -40,6 +40,9 @@ Policy = Annotated[
 Guard = Annotated[
     str | None, typer.Option(help="on: a learned policy only where the expert knows no better; off: it flies alone.")
 ]
+Profile = Annotated[
+    str | None, typer.Option(help="A named parameter set of the companion: outdoor, tight, adaptive; --params on top.")
+]
 OperatorUrl = Annotated[str | None, typer.Option(help="Link of the operator, instead of udpin port 14030.")]
 Out = Annotated[Path | None, typer.Option("--out", help="Flight folder, new or empty; default below ./flights.")]
 MissionName = Annotated[str, typer.Argument(help="A mission's name, a YAML file, or a QGroundControl .plan.")]
@@ -53,6 +56,7 @@ def fly(
     world: World = None,
     policy: Policy = None,
     guard: Guard = None,
+    profile: Profile = None,
     param: ParamSet = None,
     params: ParamFile = None,
     fault: Faults = None,
@@ -66,6 +70,7 @@ def fly(
 ) -> None:
     """Fly a mission over MAVLink, judge it, leave a flight folder. Exit code 0 only on success."""
     require_extra("sitl", "fly")
+    from companion.app.profiles import merged, profile_named
     from mission.console import FlightConsole, LogTail, print_result
     from mission.flight_folder import make_folder
     from mission.flight_plan import plan_flight
@@ -76,7 +81,7 @@ def fly(
     who, px4 = parse_firmware(firmware, px4_bin)
     times, in_step = parse_speed(speed or DEFAULT_SPEED[who.value], lockstep)
     settings = FlySettings(times, in_step, instance, operator_url, who, px4, sign_key)
-    overrides = parse_overrides(params, param)
+    overrides = merged(profile_named(profile) if profile else {}, parse_overrides(params, param))
     if guard is not None:
         overrides["policy"] = {**(overrides.get("policy") or {}), "guard": parse_switch(guard, "--guard")}
     plan = plan_flight(mission, seed, overrides, world, policy, fault or ())

@@ -21,6 +21,7 @@ from companion.app.config import VEHICLE_URL, CompanionConfig, Engage
 from companion.app.preflight import check
 from companion.app.preflight.listen import LISTEN_S
 from companion.app.preflight.show import print_json, print_table
+from companion.app.profiles import merged, profile_named, profile_names
 from companion.app.run import fly
 from companion.app.status import ExitCode
 from companion.core import params
@@ -64,8 +65,10 @@ def parser(prog: str = "python -m companion") -> OneLineParser:
     add("--lidar", metavar="URL", help=f"{lidar_help} (default: scans come over the vehicle's link)")
     goal_help = "NORTH EAST [DOWN] from where it booted"
     add("--goal", metavar="M", type=_number, nargs="+", help=goal_help)
-    add("--cruise", metavar="M_S", type=_number, default=CRUISE_M_S, help="cap of the speed (default: %(default)s)")
-    add("--params", metavar="FILE", type=Path, help="YAML of {group: {field: value}}")
+    add("--cruise", metavar="M_S", type=_number, default=CRUISE_M_S, help=f"cap of the speed (default: {CRUISE_M_S:g})")
+    add("--policy", metavar="NAME", help="who flies in RL mode: geometric, a shipped name, or a folder")
+    add("--profile", metavar="NAME", help=f"a named parameter set: {', '.join(profile_names())}")
+    add("--params", metavar="FILE", type=Path, help="YAML of {group: {field: value}}, on top of the profile")
     add("--log", metavar="DIR", type=Path, help="log folder (default: flights/<UTC>_companion)")
     add("--engage", choices=list(Engage), type=Engage, default=Engage.WAIT, help="auto: ask for OFFBOARD ourselves")
     add("--connect-timeout", metavar="S", type=_number, default=30.0, help="give up without a vehicle after this")
@@ -100,10 +103,10 @@ def check_only(given: argparse.Namespace, tuned: Params | None = None) -> int:
     """Check instead of flying; the exit code. ``tuned``: what a mission changes of the parameters."""
     goal_given, problem, tuned = given.goal is not None, None, tuned or Params()
     try:
-        tuned = params.update(tuned, read_params(given.params) if given.params else {})
+        tuned = params.update(tuned, told_params(given))
     except (InputError, ParamError) as error:
         problem = str(error)
-    given.params, given.goal = None, given.goal or ELSEWHERE
+    given.params, given.profile, given.policy, given.goal = None, None, None, given.goal or ELSEWHERE
     try:
         config = dataclasses.replace(config_from(given), params=tuned)
     except InputError as error:
@@ -135,12 +138,20 @@ def config_from(given: argparse.Namespace) -> CompanionConfig:
         log_dir=given.log or Path("flights") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}_companion",
         vehicle_url=given.vehicle or str(dataclasses.replace(url, port=url.port + given.instance)),
         lidar_url=given.lidar,
-        params=params.update(Params(), read_params(given.params)) if given.params else Params(),
+        params=params.update(Params(), told_params(given)),
         engage=given.engage,
         connect_timeout_s=given.connect_timeout,
         sign_key=given.sign_key,
         seed=given.seed,
     )
+
+
+def told_params(given: argparse.Namespace) -> dict[str, Any]:
+    """Profile, parameter file and policy as nested overrides. Raises InputError or ParamError."""
+    overrides = profile_named(given.profile) if given.profile else {}
+    if given.params is not None:
+        overrides = merged(overrides, read_params(given.params))
+    return merged(overrides, {"policy": {"name": given.policy}}) if given.policy else overrides
 
 
 def read_params(path: Path) -> dict[str, Any]:

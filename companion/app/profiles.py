@@ -1,5 +1,6 @@
 """Which named parameter sets come with the companion? ``companion/profiles/*.yaml``: {group: {field: value}} each."""
 
+from collections.abc import Mapping
 from importlib import resources
 from typing import Any
 
@@ -23,3 +24,12 @@ def profile_named(name: str) -> dict[str, dict[str, Any]]:
     text = (resources.files("companion") / FOLDER / f"{name}.yaml").read_text(encoding="utf-8")
     overrides: dict[str, dict[str, Any]] = YAML(typ="safe").load(text) or {}
     return overrides
+
+
+def merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Two sets of overrides as one; ``above`` wins, field by field."""
+    both = dict(below)
+    for group, fields in above.items():
+        known = both.get(group)
+        both[group] = {**known, **fields} if isinstance(known, Mapping) and isinstance(fields, Mapping) else fields
+    return both
