@@ -104,5 +104,6 @@ class Exploration:
 
     def _uniform(self) -> F32:
         drawn = self._rng.uniform(-1.0, 1.0, self._dim)
-        drawn[: len(self._config.scales)] *= self._config.scales
+        scales = self._config.scales[: self._dim]
+        drawn[: len(scales)] *= scales
         return np.clip(drawn, -1.0, 1.0).astype(np.float32)

@@ -155,7 +155,7 @@ def test_result_json_holds_the_fields_that_fly_prints(tmp_path: Path) -> None:
     assert list(json.loads((tmp_path / "result.json").read_text())) == [
         *("record_sha256", "truth_sha256", "success", "reason", "time_s", "path_m", "path_ratio", "min_clearance_m"),
         *("collisions", "switches", "switches_bound", "landed", "landing_error_m", "rl_decisions", "tick_p50_ms"),
-        *("tick_p99_ms", "realtime_factor", "log_dir", "seed", "world", "policy"),
+        *("tick_p99_ms", "realtime_factor", "log_dir", "seed", "world", "policy", "policy_sha256"),
     ]
 
 
