@@ -46,6 +46,9 @@ START_S: Final = 60.0  # that all have to be heard
 FACTOR_MIN: Final = 0.99  # of the speed asked for
 EXIT_HELD, EXIT_MISSED, EXIT_BAD_INPUT = 0, 1, 2
 HEADER_BYTES: Final = 10  # MAVLink 2
+ON_CHANGE: Final = (
+    mav.MAVLINK_MSG_ID_HEARTBEAT, mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, mav.MAVLINK_MSG_ID_HOME_POSITION,
+)  # fmt: skip
 KINDS: Final = {"spawn_main": "vehicle", "-m companion": "companion", "resource_tracker": "tracker"}
 
 
@@ -109,7 +112,7 @@ def soak(given: argparse.Namespace, folder: Path) -> dict[str, Any]:
     rates = LEAN_HZ if lockstep else ONBOARD_HZ
     quiet = {mav.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS}  # in its own mode only
     if lockstep:  # also sent whenever they change
-        quiet |= {mav.MAVLINK_MSG_ID_HEARTBEAT, mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE}
+        quiet |= set(ON_CHANGE)
     figures = summary(memories, [e.traffic for e in ears], {i: hz for i, hz in rates.items() if i not in quiet})
     return {**_asked(given), "legs": legs, **figures}
 
