@@ -40,6 +40,7 @@ LIVE = {
     "test_server_fuzz",
     "test_server_process",
     "test_server_setpoints",
+    "test_server_time",
     "test_ten_rules",
     "test_transport",
 }

@@ -13,19 +13,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from companion import navigator
 from companion.core import geometry
 from companion.core.gridmap import GridMap, centres, occupied
-from companion.core.inputs import Inputs
 from companion.core.params import param
-from companion.core.task import Task
-from companion.core.types import F64, Setpoint
+from companion.core.types import F64
 from companion.guidance import follower
 from companion.navigator.track import Route, course_along, track
 from companion.policy.grid_path import BLOCKED, LIMIT, clearance_field, reach_from, walk_back
-from mission.pilots import cockpit
-from mission.pilots.cockpit import Memory, View, Wish, stop_needed
-from mission.pilots.interface import PilotNote
+from mission.pilots.cockpit import Recipe, View, Wish, stop_needed
 
 UNREACHED = 4.0  # cost per cell between where a way ends and a goal on the map
 SAMPLES_PER_CELL = 2.0
@@ -68,7 +63,7 @@ class Costmap:
     cost: F64  # (n, n) at least 1, BLOCKED where nothing may pass
 
 
-class Astar:
+class Astar(Recipe):
     """Pilot 'astar'."""
 
     name = "astar"
@@ -77,17 +72,8 @@ class Astar:
     def __init__(self, params: AstarParams | None = None) -> None:
         self._params = params or AstarParams()
 
-    def start(self, params: navigator.Params) -> Memory:
-        """Nothing seen."""
-        return cockpit.start(params)
-
-    def tick(
-        self, memory: Memory, inputs: Inputs, task: Task, params: navigator.Params
-    ) -> tuple[Memory, Setpoint, PilotNote]:
-        """See ``Pilot.tick``."""
-        return cockpit.fly(memory, inputs, task, params, self._steer)
-
-    def _steer(self, view: View, plan: Plan | None) -> tuple[Plan | None, Wish]:
+    def steer(self, view: View, plan: Plan | None) -> tuple[Plan | None, Wish]:
+        """See ``Recipe.steer``."""
         due = plan is None or view.state.t_s - plan.t_s >= self._params.period_s - 1e-6
         if due:
             plan = replan(view, plan, self._params)

@@ -11,16 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion import navigator
 from companion.core.frames import yaw_rad
-from companion.core.inputs import Inputs
 from companion.core.params import param
-from companion.core.task import Task
-from companion.core.types import F64, Setpoint
+from companion.core.types import F64
 from companion.perception.polar import BEARING_RAD, BEARINGS
-from mission.pilots import cockpit
-from mission.pilots.cockpit import Memory, View, Wish, shortened
-from mission.pilots.interface import PilotNote
+from mission.pilots.cockpit import Recipe, View, Wish, shortened
 
 SECTOR_DEG = 360.0 / BEARINGS
 SIDE_BINS = 1  # to either side, over which the guidance averages
@@ -42,7 +37,7 @@ class BrakeParams:
     vel_p_1_s: float = param(1.8, "MPC_XY_VEL_P_ACC", "Velocity gain", "1/s", 1.2, 5.0)
 
 
-class Brake:
+class Brake(Recipe):
     """Pilot 'brake'."""
 
     name = "brake"
@@ -51,17 +46,7 @@ class Brake:
     def __init__(self, params: BrakeParams | None = None) -> None:
         self._params = params or BrakeParams()
 
-    def start(self, params: navigator.Params) -> Memory:
-        """Nothing seen."""
-        return cockpit.start(params)
-
-    def tick(
-        self, memory: Memory, inputs: Inputs, task: Task, params: navigator.Params
-    ) -> tuple[Memory, Setpoint, PilotNote]:
-        """See ``Pilot.tick``."""
-        return cockpit.fly(memory, inputs, task, params, self._steer)
-
-    def _steer(self, view: View, velocity_sp: F64 | None) -> tuple[F64, Wish]:
+    def steer(self, view: View, velocity_sp: F64 | None) -> tuple[F64, Wish]:
         """The next velocity setpoint, which is also what is remembered."""
         before = view.vel_ne_m_s if velocity_sp is None else velocity_sp
         share = view.approach_m_s / view.task.cruise_m_s

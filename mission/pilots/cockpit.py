@@ -6,6 +6,7 @@ gets to the goal: ``Steer``, one function from a ``View`` and its own memory to 
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -114,9 +115,25 @@ class Wish:
 Steer = Callable[[View, Any], tuple[Any, Wish]]
 
 
-def start(params: navigator.Params) -> Memory:
-    """Nothing seen, nobody flies."""
-    return Memory(gridmap.empty(params.map))
+class Recipe(ABC):
+    """A pilot but for its way to the goal; see ``Pilot``."""
+
+    name: str
+    source: str
+
+    def start(self, params: navigator.Params) -> Memory:
+        """Nothing seen, nobody flies."""
+        return Memory(gridmap.empty(params.map))
+
+    def tick(
+        self, memory: Memory, inputs: Inputs, task: Task, params: navigator.Params
+    ) -> tuple[Memory, Setpoint, PilotNote]:
+        """See ``Pilot.tick``."""
+        return fly(memory, inputs, task, params, self.steer)
+
+    @abstractmethod
+    def steer(self, view: View, own: Any) -> tuple[Any, Wish]:
+        """What is asked for now, and what is remembered for the next tick; ``own`` is None at first."""
 
 
 def fly(

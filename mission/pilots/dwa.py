@@ -13,15 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion import navigator
 from companion.core.geometry import points_near
-from companion.core.inputs import Inputs
 from companion.core.params import param
-from companion.core.task import Task
-from companion.core.types import F64, Setpoint
-from mission.pilots import cockpit
-from mission.pilots.cockpit import Memory, View, Wish
-from mission.pilots.interface import PilotNote
+from companion.core.types import F64
+from mission.pilots.cockpit import Recipe, View, Wish
 
 DIRECTIONS = 72
 SPEEDS = 8
@@ -45,7 +40,7 @@ class DwaParams:
     reach_m: float = param(4.0, "DWA_REACH", "Free way that is as good as any", "m", 0.5, 20.0)
 
 
-class Dwa:
+class Dwa(Recipe):
     """Pilot 'dwa'."""
 
     name = "dwa"
@@ -54,17 +49,8 @@ class Dwa:
     def __init__(self, params: DwaParams | None = None) -> None:
         self._params = params or DwaParams()
 
-    def start(self, params: navigator.Params) -> Memory:
-        """Nothing seen."""
-        return cockpit.start(params)
-
-    def tick(
-        self, memory: Memory, inputs: Inputs, task: Task, params: navigator.Params
-    ) -> tuple[Memory, Setpoint, PilotNote]:
-        """See ``Pilot.tick``."""
-        return cockpit.fly(memory, inputs, task, params, self._steer)
-
-    def _steer(self, view: View, own: None) -> tuple[None, Wish]:
+    def steer(self, view: View, own: None) -> tuple[None, Wish]:
+        """See ``Recipe.steer``."""
         params = self._params
         hull_m = view.params.vehicle.radius_m
         near = points_near(view.pos_ne_m[None], view.percept.points_ne_m, params.reach_m + hull_m + params.margin_m)

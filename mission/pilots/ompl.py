@@ -14,17 +14,13 @@ import numpy as np
 
 from companion import navigator
 from companion.core import geometry
-from companion.core.inputs import Inputs
 from companion.core.params import param
-from companion.core.task import Task
-from companion.core.types import F64, Setpoint
+from companion.core.types import F64
 from companion.guidance import follower, limits
 from companion.navigator.track import course_along
 from mission.errors import InputError
-from mission.pilots import cockpit
 from mission.pilots.astar import Plan
-from mission.pilots.cockpit import Memory, View, Wish, stop_needed
-from mission.pilots.interface import PilotNote
+from mission.pilots.cockpit import Memory, Recipe, View, Wish, stop_needed
 from sitl.world import World
 
 SHARES = (1.0, 0.5, 0.25)  # of the margin
@@ -45,7 +41,7 @@ class Own:
     plan: Plan | None  # None: there is no way
 
 
-class Ompl:
+class Ompl(Recipe):
     """Pilot 'ompl'; flies only what it was ``told``."""
 
     name = "ompl"
@@ -67,15 +63,10 @@ class Ompl:
         """Nothing planned. Raises InputError where it was not told the world."""
         if self._world is None:
             raise InputError("pilot 'ompl' flies only where it is told the world")
-        return cockpit.start(params)
+        return super().start(params)
 
-    def tick(
-        self, memory: Memory, inputs: Inputs, task: Task, params: navigator.Params
-    ) -> tuple[Memory, Setpoint, PilotNote]:
-        """See ``Pilot.tick``."""
-        return cockpit.fly(memory, inputs, task, params, self._steer)
-
-    def _steer(self, view: View, own: Own | None) -> tuple[Own, Wish]:
+    def steer(self, view: View, own: Own | None) -> tuple[Own, Wish]:
+        """See ``Recipe.steer``."""
         due = own is None or (own.plan is not None and _off_m(view, own.plan) > BACK_M)
         if own is None or due:
             own = Own(self._planned(view))

@@ -16,10 +16,7 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from companion import navigator
 from companion.core.frames import yaw_rad
-from companion.core.inputs import Inputs
-from companion.core.task import Task
 from companion.core.types import F64, Setpoint
 from companion.perception.observation import observation
 from companion.perception.perceive import representatives
@@ -28,9 +25,7 @@ from companion.policy.interface import Query
 from companion.policy.observations import SIZES, observe
 from companion.policy.store import POLICIES
 from mission.errors import InputError
-from mission.pilots import cockpit
-from mission.pilots.cockpit import Memory, View, Wish, shortened
-from mission.pilots.interface import PilotNote
+from mission.pilots.cockpit import Recipe, View, Wish, shortened
 
 FOLDER = POLICIES.parent / "baselines" / "td3_vanilla"
 ACTOR, CARD = "actor.safetensors", "card.json"
@@ -56,7 +51,7 @@ class Own:
     ticks_left: int
 
 
-class Td3Vanilla:
+class Td3Vanilla(Recipe):
     """Pilot 'td3_vanilla'."""
 
     name = "td3_vanilla"
@@ -66,17 +61,8 @@ class Td3Vanilla:
         """Raises InputError where there is no trained actor, or one that does not fit."""
         self._card, self._actor = load_low_level(folder)
 
-    def start(self, params: navigator.Params) -> Memory:
-        """Nothing seen."""
-        return cockpit.start(params)
-
-    def tick(
-        self, memory: Memory, inputs: Inputs, task: Task, params: navigator.Params
-    ) -> tuple[Memory, Setpoint, PilotNote]:
-        """See ``Pilot.tick``."""
-        return cockpit.fly(memory, inputs, task, params, self._steer)
-
-    def _steer(self, view: View, own: Own | None) -> tuple[Own, Wish]:
+    def steer(self, view: View, own: Own | None) -> tuple[Own, Wish]:
+        """See ``Recipe.steer``."""
         due = own is None or own.ticks_left == 0
         if own is None or due:
             own = Own(self._decided(view), self._card.hold_ticks)

@@ -17,20 +17,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from companion import navigator
 from companion.core import geometry
 from companion.core.geometry import points_near
-from companion.core.inputs import Inputs
 from companion.core.params import param
-from companion.core.task import Task
-from companion.core.types import F64, Setpoint
+from companion.core.types import F64
 from companion.guidance import follower
 from companion.guidance.limits import stopping_speed
 from mission.pilots import cockpit
 from mission.pilots.astar import AstarParams, Plan, replan
-from mission.pilots.cockpit import Memory, View, Wish
+from mission.pilots.cockpit import Recipe, View, Wish
 from mission.pilots.dwa import free_ways
-from mission.pilots.interface import PilotNote
 
 SECTORS = 72
 SECTOR_RAD = math.tau / SECTORS
@@ -77,7 +73,7 @@ class Own:
     decided_t_s: float = -math.inf
 
 
-class Vfh:
+class Vfh(Recipe):
     """Pilot 'vfh'."""
 
     name = "vfh"
@@ -87,17 +83,8 @@ class Vfh:
         self._params = params or VfhParams()
         self._planner = planner or AstarParams()
 
-    def start(self, params: navigator.Params) -> Memory:
-        """Nothing seen."""
-        return cockpit.start(params)
-
-    def tick(
-        self, memory: Memory, inputs: Inputs, task: Task, params: navigator.Params
-    ) -> tuple[Memory, Setpoint, PilotNote]:
-        """See ``Pilot.tick``."""
-        return cockpit.fly(memory, inputs, task, params, self._steer)
-
-    def _steer(self, view: View, own: Own | None) -> tuple[Own, Wish]:
+    def steer(self, view: View, own: Own | None) -> tuple[Own, Wish]:
+        """See ``Recipe.steer``."""
         params, own = self._params, own or Own()
         plan, planned = self._planned(view, own.plan)
         near = points_near(

@@ -9,7 +9,7 @@ import pytest
 from mavsdk_kit import vehicle
 from mission_kit import item_int, place
 from pymavlink.dialects.v20 import common as mav
-from test_server import Client
+from server_kit import Client
 
 from sitl.mission_items import MissionItem
 from sitl.modes import FlightMode
