@@ -27,7 +27,8 @@ from sitl.truth_log import TruthFile
 from sitl.voice import ScanBundle, Voice
 
 ANSWER_WALL_S: Final = 2.0  # lockstep: patience for one setpoint
-POLL_WALL_S: Final = 0.02  # streams and the stop request are looked at this often
+POLL_WALL_S: Final = 0.02  # the stop request is looked at this often
+REST_WALL_S: Final = 0.001  # between two looks at the streams, whatever rate a client has asked for
 FLUSH_WALL_S: Final = 1.0
 SLICE_STEPS: Final = 5  # paced: 20 ms, the finest navigation stream
 
@@ -105,14 +106,15 @@ class Server:
             self._truth.flush()
 
     def _serve(self, timeout_s: float) -> None:
-        """Send what is due, then wait for messages at most ``timeout_s`` and act on them."""
+        """Send what is due, then wait for messages at most ``timeout_s``, or until more is due, and act on them."""
         now_s = self._clock.now_s()
         self._voice.stream_by_wall(round(now_s * 1e6))
         if now_s - self._flush_s > FLUSH_WALL_S:
             self._flush_s = now_s
             self.flush()
         if timeout_s > 0.0:
-            wait_readable(self._waits_on, timeout_s, self._clock)
+            due_s = max(self._voice.next_by_wall_us / 1e6 - now_s, REST_WALL_S)
+            wait_readable(self._waits_on, min(timeout_s, due_s), self._clock)
         if self._airspace is not None:
             self._airspace.listen()
         for link in self._links:

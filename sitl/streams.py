@@ -1,5 +1,6 @@
 """Which messages are due on a link now? Rates by message id, as PX4 has them by default; pure, time in microseconds."""
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Final
 
@@ -76,6 +77,11 @@ class StreamSchedule:
         self._due_us: dict[int, int] = dict.fromkeys(self._interval_us, 0)
         self._next_us = 0
         self._now_us = 0
+
+    @property
+    def next_us(self) -> float:
+        """When the next message is due; inf when there is none."""
+        return self._next_us if self._due_us else math.inf
 
     def interval_us(self, message_id: int) -> int:
         """The interval in force: 0 when the message is not streamed."""

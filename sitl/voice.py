@@ -1,5 +1,6 @@
 """What does the vehicle say, to whom and when? Streams, changes, texts, and the scan with what belongs to it."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -63,6 +64,11 @@ class Voice:
         """What is due by wall time, on every link."""
         for link in self._links:
             self._send(link, link.wall.due(now_us))
+
+    @property
+    def next_by_wall_us(self) -> float:
+        """When ``stream_by_wall`` has more to say; inf when nothing is streamed."""
+        return min((link.wall.next_us for link in self._links), default=math.inf)
 
     def stream_by_vehicle(self) -> None:
         """What is due by vehicle time, on the companion's link."""

@@ -108,6 +108,7 @@ def test_a_schedule_keeps_its_rates_and_does_not_catch_up() -> None:
     schedule = StreamSchedule({1: 50.0, 2: 10.0})
     sent = [i for now_ms in range(0, 1000, 4) for i in schedule.due(now_ms * 1000)]
     assert (sent.count(1), sent.count(2)) == (50, 10)
+    assert schedule.next_us == 1_000_000
     assert schedule.due(5_000_000) == [1, 2]
     assert schedule.due(5_000_001) == []
     schedule.set_interval(1, -1)
@@ -116,6 +117,7 @@ def test_a_schedule_keeps_its_rates_and_does_not_catch_up() -> None:
     assert schedule.interval_us(1) == 0
     schedule.set_interval(1, 0)
     assert schedule.interval_us(1) == 20_000
+    assert StreamSchedule({}).next_us == math.inf
 
 
 def test_a_speed_must_be_above_zero() -> None:
