@@ -20,6 +20,7 @@ LIVE = {
     "test_client_steering",
     "test_client_system",
     "test_companion_app_process",
+    "test_companion_junk",
     "test_companion_serial",
     "test_disturbed",
     "test_fleet",

@@ -12,15 +12,17 @@ from pretend_vehicle import STEP_S, PretendVehicle
 
 from companion.app.config import CompanionConfig, Engage
 from companion.app.logs import FlightLogs
-from companion.app.opening import Opened, connect
+from companion.app.opening import LIDAR_LINK, VEHICLE_LINK, Opened, connect
 from companion.app.process import Companion
 from companion.app.signals import StopRequest
 from companion.core.clock import ManualClock
 from companion.core.inputs import Inputs
+from companion.core.keyring import Keyring
 from companion.core.lossy import Loss, LossyTransport
 from companion.core.mavlink import Connection
+from companion.core.signing import PX4_UNSIGNED
 from companion.core.task import Task
-from companion.core.transport import pair
+from companion.core.transport import Transport, pair
 from companion.core.types import Setpoint
 from companion.link.lidar_replay import ReplayLidar
 from companion.link.lidar_serial import SerialLidar
@@ -58,23 +60,28 @@ class Bench:
     loss: Loss | None = None
     own_lidar: bool = False
     local_lidar: ReplayLidar | SerialLidar | None = None
+    wire: tuple[Transport, Transport] | None = None  # the companion's end and the vehicle's; None: in this process
+    lidar_wire: tuple[Transport, Transport] | None = None
+    key: Path | None = None  # both sign with it
 
     def __post_init__(self) -> None:
         self.clock = ManualClock()
         self.stop = StopRequest()
         self.said: list[str] = []
-        near, far = pair("pair://vehicle")
+        near, far = self.wire or pair("pair://vehicle")
         ends = [near]
         lidar = None
+        rings = [Keyring(self.key, name, self.clock) if self.key else None for name in ("vehicle", "companion")]
+        signing = [rings[0].link(i, PX4_UNSIGNED) if rings[0] else None for i in (VEHICLE_LINK, LIDAR_LINK)]
         if self.own_lidar:
-            lidar_near, lidar_far = pair("pair://lidar")
+            lidar_near, lidar_far = self.lidar_wire or pair("pair://lidar")
             ends.append(lidar_near)
-            lidar = Connection(lidar_far, 1, 195)
-        self.vehicle = PretendVehicle(Connection(far, 1, 1), lidar)
+            lidar = Connection(lidar_far, 1, 195, signing=signing[LIDAR_LINK])
+        self.vehicle = PretendVehicle(Connection(far, 1, 1, signing=signing[VEHICLE_LINK]), lidar)
         config = CompanionConfig(TASK, self.tmp_path / "log", engage=self.engage, connect_timeout_s=5.0)
         self.logs = FlightLogs(config.log_dir)
         transports = ends if self.loss is None else [LossyTransport(end, self.loss, 3, self.clock) for end in ends]
-        opened = Opened(transports[0], transports[1] if self.own_lidar else self.local_lidar)
+        opened = Opened(transports[0], transports[1] if self.own_lidar else self.local_lidar, rings[1])
         links = connect(opened, config, self.logs, self.clock)
         self.companion = Companion(config, *links, self.logs, self.brain, self.clock)
         self.companion.say = self.said.append

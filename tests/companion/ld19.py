@@ -2,6 +2,7 @@
 
 import math
 import os
+import random
 import struct
 import threading
 import time
@@ -33,6 +34,14 @@ def revolution(room: Room) -> list[bytes]:
     ]
 
 
+def noise(rng: random.Random) -> bytes:
+    """Something like a packet that is none: random, cut off, changed, starts without an end."""
+    whole = packet(rng.uniform(0.0, 360.0), 0.8, [rng.uniform(0.0, 12.0) for _ in range(POINTS)])
+    at = rng.randrange(1, len(whole))
+    changed = whole[:at] + bytes([whole[at] ^ rng.randrange(1, 256)]) + whole[at + 1 :]
+    return rng.choice((rng.randbytes(at), whole[:at], changed, whole[:2] * at))
+
+
 class Ld19:
     """Turns in a thread while plugged in."""
 
@@ -48,6 +57,10 @@ class Ld19:
         self._pulled = threading.Event()
         self._thread = threading.Thread(target=self._turn)
         self._thread.start()
+
+    def disturb(self, noise: bytes) -> None:
+        """Between two of its packets."""
+        os.write(self._master, noise)
 
     def pull(self) -> None:
         self._pulled.set()

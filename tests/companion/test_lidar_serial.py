@@ -1,6 +1,7 @@
 """Does a serial LiDAR reach the navigator and the autopilot? lds2d's own parsers behind a pseudo terminal."""
 
 import math
+import random
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ import pytest
 
 pytest.importorskip("lds2d", reason="needs the 'hw' extra")
 
-from ld19 import TURN_HZ, Ld19
+from ld19 import TURN_HZ, Ld19, noise
 
 from companion.core import codec
 from companion.core.clock import SystemClock
@@ -87,6 +88,18 @@ def test_an_unplugged_lidar_is_silence_and_goes_on_when_it_is_back(ld19: Ld19) -
         assert collected(lidar, lambda _: False, 0.5) == []
         ld19.plug_in()
         assert len(collected(lidar, lambda scans: len(scans) >= 3)) >= 3
+
+
+def test_ten_thousand_packets_of_noise_on_the_line_are_not_the_end_of_it(ld19: Ld19) -> None:
+    rng = random.Random(5)
+    with closing(SerialLidar("LD19", str(ld19.path), None, LidarParams())) as lidar:
+        for _ in range(10_000):
+            ld19.disturb(noise(rng))
+        scans = collected(lidar, lambda scans: len(scans) >= 14)[-4:]
+    for scan in scans:
+        bearing_deg = np.degrees(scan.angle_offset_rad + np.arange(72) * scan.increment_rad) % 360.0
+        assert scan.range_m[np.abs(bearing_deg - 90.0) < 5.0] == pytest.approx(4.0, abs=0.05)
+        assert np.isinf(scan.range_m[np.abs(bearing_deg - 230.0) < 20.0]).all()
 
 
 def test_without_vehicle_time_scans_are_dropped_and_not_kept_for_later(ld19: Ld19) -> None:
