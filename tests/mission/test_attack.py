@@ -41,14 +41,15 @@ def left_behind(result: Result) -> tuple[str, str]:
     return result.record_sha256, result.truth_sha256
 
 
+@pytest.mark.parametrize("signed", [False, True], ids=["unsigned", "signed"])
 def test_ten_thousand_packets_of_junk_at_every_port_do_not_change_a_flight(
-    short: FlightPlan, undisturbed: tuple[str, str], tmp_path: Path, instance: int
+    short: FlightPlan, undisturbed: tuple[str, str], tmp_path: Path, instance: int, signed: bool
 ) -> None:
     def source(port: int) -> Iterator[bytes]:
         return junk(random.Random(port))
 
-    settings = FlySettings(SPEED, lockstep=True, instance=instance)
-    disturbed = besieged(short, settings, tmp_path, 10_000, source, all_ports(instance), OVER_WALL_S)
+    settings = FlySettings(SPEED, lockstep=True, instance=instance, sign_key=make_key(tmp_path) if signed else None)
+    disturbed = besieged(short, settings, tmp_path / "flight", 10_000, source, all_ports(instance), OVER_WALL_S)
     assert set(disturbed.sent.values()) == {10_000}
     assert disturbed.result.landed, disturbed.result.reason
     assert left_behind(disturbed.result) == undisturbed
