@@ -1,6 +1,7 @@
 # SWIFT-Nav: `make fly` and `make test` do all their own set-up.
 VENV := .venv
 BIN := $(VENV)/bin
+VENV3 := .venv-mavsdk3
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
@@ -15,7 +16,7 @@ DEBIAN_PACKAGES := python3 python3-venv
 help:
 	@echo "make fly     set up and fly trajectory 2; ARGS='trajectory1 --seed 3 --speed 1' for another flight"
 	@echo "make test    set up, check and test: everything CI runs"
-	@echo "make setup   create .venv and install everything for development"
+	@echo "make setup   create .venv and .venv-mavsdk3, install everything for development"
 	@echo "make check   format, lint, types, floors"
 	@echo "make format  put files into the house format"
 	@echo "make docs    write docs/parameters.md from the code"
@@ -23,7 +24,7 @@ help:
 	@echo "make tables  flights over many seeds, judged: the results in README.md"
 	@echo "make bench   speed as ratios to bare JSBSim"
 	@echo "make images  build the container images and try them out (docker or podman; as root buildah)"
-	@echo "make clean   remove .venv and caches"
+	@echo "make clean   remove both environments and caches"
 
 $(BIN)/python:
 	@$(FIND_PYTHON); \
@@ -48,7 +49,13 @@ $(VENV)/.scale: $(VENV)/.dev
 	$(BIN)/pip install -q -c constraints.txt -e '.[dev,scale]'
 	@touch $@
 
-setup: $(VENV)/.dev
+# The second client that the vehicle is tested with: MAVSDK 3.17.4 and 4.1 do not go into one environment.
+$(VENV3)/.ready: constraints-mavsdk3.txt | $(BIN)/python
+	$(BIN)/python -m venv $(VENV3)
+	$(VENV3)/bin/pip install -q -c constraints-mavsdk3.txt mavsdk
+	@touch $@
+
+setup: $(VENV)/.dev $(VENV3)/.ready
 
 fly: $(VENV)/.sitl
 	$(BIN)/swiftnav fly $(ARGS)
@@ -63,9 +70,9 @@ format: $(VENV)/.dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-test: check
+test: check $(VENV3)/.ready
 	$(BIN)/pytest -n 2 -m "not slow and not live"
-	$(BIN)/pytest -m "live and not slow" --reruns 3 --reruns-delay 1
+	SWIFTNAV_MAVSDK3=$(VENV3)/bin/python $(BIN)/pytest -m "live and not slow" --reruns 3 --reruns-delay 1
 
 slow: $(VENV)/.scale
 	$(BIN)/pytest -m slow --timeout 3600
@@ -85,4 +92,4 @@ images: $(VENV)/.sitl
 	PYTHON=$(BIN)/python sh docker/images.sh
 
 clean:
-	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(VENV3) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -67,9 +67,9 @@ def sitl(
     """
     require_extra("sitl", "sitl")
     from mission.px4_firmware import running
-    from mission.runner import FlySettings
     from mission.world_file import load_world
     from sitl.app import run
+    from sitl.server import RunConfig
     from sitl.simulation import SimConfig
     from sitl.vehicle_config import VehicleConfig
 
@@ -79,11 +79,10 @@ def sitl(
     sim = SimConfig(
         seed, spawn, math.radians(_finite(yaw, "--yaw")), _wind(wind, turbulence), faults=tuple(fault or ())
     )
-    settings = FlySettings(times, in_step, instance)
     config = VehicleConfig(
         place.seeded(seed),
         sim,
-        settings.run_config,
+        RunConfig(times, in_step, gates=in_step),  # paced, any client may fly it, as often as it likes: no gates
         instance,
         log_dir=out,
         params_file=params,

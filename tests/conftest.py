@@ -22,6 +22,7 @@ LIVE = {
     "test_companion_app_process",
     "test_companion_junk",
     "test_companion_serial",
+    "test_conversations",
     "test_disturbed",
     "test_fleet",
     "test_lidar",
