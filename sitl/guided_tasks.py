@@ -1,11 +1,11 @@
-"""Where should the vehicle be right now in Reposition, Orbit and Follow Target? Local ned.
+"""Where should the vehicle be right now in Reposition and Orbit? Local ned.
 
 Tasks with memory: made when the mode begins to steer, asked for a demand at every control tick.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final
 
@@ -15,16 +15,13 @@ from companion.core.frames import wrap_rad, yaw_rad
 from companion.core.types import F64, VehicleState
 from sitl.chaser import Chaser, Pace
 from sitl.demand import Demand, position_demand
-from sitl.flight_tasks import hold
-from sitl.home import Home
+from sitl.pilot import Sticks, expo
 from sitl.px4_params import ParamStore
 
 RADIUS_MIN_M: Final = 1.0  # FlightTaskOrbit: _radius_min
 SPEED_MAX_M_S: Final = 10.0  # FlightTaskOrbit: _velocity_max
 ACC_MAX_M_S2: Final = 2.0  # FlightTaskOrbit: _acceleration_max
 ON_CIRCLE_M: Final = 0.5  # assumed: nearer than this, the round begins
-MOVING_M_S: Final = 0.5  # assumed: a target slower than this keeps its course
-TARGET_LOST_S: Final = 8.0  # FollowTarget: TARGET_TIMEOUT_S
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,15 +53,6 @@ class Circle:
     nose: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Target:
-    """Somebody to follow, as last heard."""
-
-    t_s: float
-    pos_ned_m: F64  # (3,)
-    vel_ned_m_s: F64  # (3,)
-
-
 def auto_pace(params: ParamStore, speed_m_s: float | None = None) -> Pace:
     """PX4's speeds of its autonomous modes."""
     level_m_s = min(speed_m_s or params["MPC_XY_CRUISE"], params["MPC_XY_VEL_MAX"])
@@ -89,10 +77,14 @@ class FlyTo:
 
 
 class Orbit:
-    """Fly straight to the circle, then round it."""
+    """Fly straight to the circle, then round it; sticks make it larger or smaller, quicker or slower."""
 
-    def __init__(self, state: VehicleState, circle: Circle, params: ParamStore) -> None:
+    def __init__(
+        self, state: VehicleState, circle: Circle, params: ParamStore, hands: Callable[[float], Sticks]
+    ) -> None:
+        """``hands``: the sticks at a time, centred where there are none."""
         self.circle = circle
+        self._hands = hands
         self._params = params
         self._chaser = Chaser(state)
         self._initial_rad = yaw_rad(state.q_ned_frd)
@@ -103,6 +95,7 @@ class Orbit:
     def demand(self, state: VehicleState) -> Demand:
         """A point of the way to the circle, or of the circle."""
         dt_s, self._t_s = state.t_s - self._t_s, state.t_s
+        self.circle = by_sticks(self.circle, self._hands(state.t_s), dt_s, self._params)
         if math.isnan(self._bearing_rad):
             return self._approach(state)
         return self._round(dt_s)
@@ -115,7 +108,7 @@ class Orbit:
         centre = self.circle.centre_ned_m
         away = state.pos_ned_m[:2] - centre[:2]
         bearing_rad = math.atan2(away[1], away[0])
-        nearest = _on_circle(centre, self.circle.radius_m, bearing_rad)
+        nearest = on_circle(centre, self.circle.radius_m, bearing_rad)
         if float(np.linalg.norm(state.pos_ned_m - nearest)) < ON_CIRCLE_M:
             self._bearing_rad = bearing_rad
             return self._round(0.0)
@@ -132,7 +125,7 @@ class Orbit:
         along = np.array([-out[1], out[0], 0.0])
         chaser.run(self._t_s, chaser.pos_ned_m, auto_pace(self._params), self._nose_rad())
         return position_demand(
-            _on_circle(circle.centre_ned_m, circle.radius_m, bearing),
+            on_circle(circle.centre_ned_m, circle.radius_m, bearing),
             chaser.yaw_rad,
             along * self._speed_m_s,
             out * (-(self._speed_m_s**2) / circle.radius_m),
@@ -147,49 +140,19 @@ class Orbit:
         return self._initial_rad
 
 
-class Follow:
-    """Keep a place relative to somebody who moves, nose towards them."""
-
-    def __init__(
-        self, state: VehicleState, latest: Callable[[], Target | None], params: ParamStore, home: Home
-    ) -> None:
-        self._latest = latest
-        self._params = params
-        self._home = home
-        self._chaser = Chaser(state)
-        self._stay = hold(state)
-        self._course_rad = math.nan
-
-    def demand(self, state: VehicleState) -> Demand:
-        """The point that runs after the place; without a target, stay."""
-        target = self._latest()
-        if target is None or state.t_s - target.t_s > TARGET_LOST_S:
-            return self._stay.demand(state)
-        there = target.pos_ned_m + target.vel_ned_m_s * (state.t_s - target.t_s)
-        course_rad = self._course(state, target, there)
-        distance_m, angle_deg = self._params["FLW_TGT_DST"], self._params["FLW_TGT_FA"]
-        place = _on_circle(there, max(1.0, distance_m), course_rad + math.radians(angle_deg))
-        height_m = max(1.0, self._params["FLW_TGT_HT"])
-        place[2] = (there[2] if self._params["FLW_TGT_ALT_M"] == 2 else self._home.down_m) - height_m
-        north_m, east_m = (there - state.pos_ned_m)[:2]
-        speed_m_s = float(np.linalg.norm(target.vel_ned_m_s)) + max(1.0, self._params["FLW_TGT_MAX_VEL"])
-        pace = auto_pace(self._params, speed_m_s)
-        demand = self._chaser.run(state.t_s, place, pace, math.atan2(east_m, north_m))
-        self._stay = hold(state)
-        return demand
-
-    def done(self, state: VehicleState) -> bool:
-        """Never."""
-        return False
-
-    def _course(self, state: VehicleState, target: Target, there: F64) -> float:
-        north_m_s, east_m_s = target.vel_ned_m_s[:2]
-        if math.hypot(north_m_s, east_m_s) > MOVING_M_S:
-            self._course_rad = math.atan2(east_m_s, north_m_s)
-        elif math.isnan(self._course_rad):  # never moved: the place is where the vehicle comes from
-            away = state.pos_ned_m[:2] - there[:2]
-            self._course_rad = math.atan2(away[1], away[0]) - math.radians(self._params["FLW_TGT_FA"])
-        return self._course_rad
+def by_sticks(circle: Circle, sticks: Sticks, dt_s: float, params: ParamStore) -> Circle:
+    """FlightTaskOrbit: along its nose the vehicle changes the radius, across the nose the speed."""
+    curve, dead_zone = params["MPC_XY_MAN_EXPO"], params["MPC_HOLD_DZ"]
+    inwards, left = expo(sticks.forward, curve, dead_zone), -expo(sticks.right, curve, dead_zone)
+    if not inwards and not left:
+        return circle
+    if circle.nose == Nose.TANGENT:  # clockwise, the centre is to its right
+        sign = math.copysign(1.0, circle.speed_m_s)
+        inwards, left = -left * sign, inwards * sign
+    radius_m = circle.radius_m - inwards * params["MPC_XY_CRUISE"] * dt_s
+    radius_m = min(max(radius_m, RADIUS_MIN_M), params["MC_ORBIT_RAD_MAX"])
+    speed_m_s = circle.speed_m_s + left * params["MPC_ACC_HOR"] * dt_s
+    return replace(circle, radius_m=radius_m, speed_m_s=circle_speed_m_s(radius_m, speed_m_s))
 
 
 def circle_speed_m_s(radius_m: float, speed_m_s: float) -> float:
@@ -198,6 +161,7 @@ def circle_speed_m_s(radius_m: float, speed_m_s: float) -> float:
     return min(max(speed_m_s, -most), most)
 
 
-def _on_circle(centre_ned_m: F64, radius_m: float, bearing_rad: float) -> F64:
+def on_circle(centre_ned_m: F64, radius_m: float, bearing_rad: float) -> F64:
+    """The point of a circle in a direction from its centre."""
     offset = np.array([math.cos(bearing_rad), math.sin(bearing_rad), 0.0])
     return centre_ned_m + radius_m * offset

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import common as mav
 
 from sitl import setpoints
 from sitl.answers import CRITICAL, StatusText
-from sitl.guided_tasks import Target
+from sitl.follow import Target
 from sitl.link import COMPONENT, Link
 from sitl.pilot import sticks_of
 from sitl.simulation import Simulation

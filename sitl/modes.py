@@ -78,8 +78,10 @@ FLYABLE: Final = frozenset(
         FlightMode.TERMINATION,
     }
 )
-# Modes that a pilot's stick ends (COM_RC_OVERRIDE).
-AUTONOMOUS: Final = FLYABLE - {FlightMode.OFFBOARD, FlightMode.TERMINATION} | {FlightMode.MISSION}
+# Modes that a pilot's stick ends (COM_RC_OVERRIDE). In Orbit and Follow Target it changes what is flown.
+AUTONOMOUS: Final = frozenset(
+    {FlightMode.HOLD, FlightMode.TAKEOFF, FlightMode.LAND, FlightMode.RTL, FlightMode.MISSION}
+)
 # Modes in which PX4 lets the motors start; OFFBOARD with setpoints, MISSION with one, those of MANUAL with sticks.
 ARMABLE: Final = frozenset({FlightMode.HOLD, FlightMode.TAKEOFF, FlightMode.OFFBOARD, FlightMode.MISSION})
 

@@ -59,6 +59,10 @@ class Pilot:
         """Where the sticks are."""
         return self._sticks
 
+    def held(self, t_s: float) -> Sticks:
+        """Where the sticks are, or centred where nobody is at them."""
+        return self._sticks if self.present(t_s) else CENTRED
+
     def rest(self) -> None:
         """A mode begins: sticks that stay where they are now do not take over."""
         self._at_rest = self._sticks

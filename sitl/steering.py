@@ -25,8 +25,9 @@ from sitl.demand import (
     rates_demand,
 )
 from sitl.flight_tasks import FlightTask, GoTo, Land
+from sitl.follow import Follow, Target
 from sitl.geo import Origin
-from sitl.guided_tasks import Circle, FlyTo, Follow, Goal, Orbit, Target
+from sitl.guided_tasks import Circle, FlyTo, Goal, Orbit
 from sitl.home import Home
 from sitl.manual_tasks import CLIMBS, Acro, Assisted, Stabilized
 from sitl.mission_flight import MissionFlight
@@ -165,7 +166,10 @@ class Steering:
             self._task = self._begin(behaviour, state)
         if self._legs and self._task.done(state):
             self._task = self._next_leg(state)
-        return self._task.demand(state)
+        demand = self._task.demand(state)
+        if isinstance(self._task, Orbit):
+            self.circle = self._task.circle  # sticks may have changed it
+        return demand
 
     def _begin(self, behaviour: Behaviour, state: VehicleState) -> FlightTask:
         params = self._params
@@ -179,9 +183,9 @@ class Steering:
         if behaviour is Behaviour.DESCEND:
             return flight_tasks.Descend(yaw_rad(state.q_ned_frd), params)
         if behaviour is Behaviour.ORBIT and self.circle is not None:
-            return Orbit(state, self.circle, params)
+            return Orbit(state, self.circle, params, self.pilot.held)
         if behaviour is Behaviour.FOLLOW:
-            return Follow(state, lambda: self.target, params, self.home)
+            return Follow(state, lambda: self.target, params, self.home, self.pilot.held)
         if behaviour in STICKS:
             return self._by_hand(behaviour, state)
         return FlyTo(state, self.goal, params) if self.goal is not None else flight_tasks.hold(state)

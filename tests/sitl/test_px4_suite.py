@@ -12,6 +12,7 @@ from itertools import count
 import pytest
 from mavsdk.asyncio.plugins.failure import FailureAsync
 from mavsdk.asyncio.plugins.follow_me import FollowMeAsync
+from mavsdk.asyncio.plugins.manual_control import ManualControlAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.plugins.failure import FailureType, FailureUnit
@@ -161,6 +162,49 @@ def test_follow_target_without_a_place_stays_where_it_is() -> None:
             await seconds(1.0)
         assert math.dist(before[:2], pilot.position_ned_m[:2]) < 4.0
         assert pilot.mode == "FOLLOW_ME"
+        await follow.stop()
+
+    fly(next(INSTANCES), story, SPEED)
+
+
+@pytest.mark.slow
+def test_follow_target_adjusted_by_sticks() -> None:
+    """Each stick at its stop for 3 s changes at least half of what it is to change."""
+
+    async def story(pilot: Pilot) -> None:
+        follow, manual = FollowMeAsync(pilot.system), ManualControlAsync(pilot.system)
+        sticks = [0.0, 0.0, 0.5, 0.0]
+
+        async def stream() -> None:
+            while True:
+                await follow.set_target_location(TargetLocation(*place, ORIGIN.alt_m(0.0), 0.0, 0.0, 0.0))
+                await manual.set_manual_control_input(*sticks)
+                await asyncio.sleep(0.02)
+
+        async def push(*deflected: float) -> None:
+            sticks[:] = deflected
+            await seconds(3.0)
+            sticks[:] = [0.0, 0.0, 0.5, 0.0]
+            await seconds(3.0)
+
+        place = ORIGIN.lat_lon_deg(0.0, 0.0)
+        await ParamAsync(pilot.system).set_param_float("COM_RC_LOSS_T", 5.0)
+        await climb(pilot, 10.0)
+        await follow.set_config(Config(10.0, 10.0, 0.1, Config.FollowAltitudeMode.CONSTANT, 5.0, 0.0))
+        await follow.start()
+        streaming = asyncio.create_task(stream())
+        await pilot.until(lambda: abs(math.hypot(*pilot.position_ned_m[:2]) - 10.0) < 0.5)
+        down_m = pilot.position_ned_m[2]
+        await push(0.0, 0.0, 1.0, 0.0)
+        assert down_m - pilot.position_ned_m[2] > 1.5 * 3.0 / 2
+        await push(1.0, 0.0, 0.5, 0.0)
+        assert math.hypot(*pilot.position_ned_m[:2]) > 10.0 + 2.0 * 3.0 / 2
+        before_rad = math.atan2(pilot.position_ned_m[1], pilot.position_ned_m[0])
+        await push(0.0, 1.0, 0.5, 0.0)
+        after_rad = math.atan2(pilot.position_ned_m[1], pilot.position_ned_m[0])
+        assert (after_rad - before_rad) % math.tau > 5.0 / 16.0 * 3.0 / 2
+        assert pilot.mode == "FOLLOW_ME"
+        streaming.cancel()
         await follow.stop()
 
     fly(next(INSTANCES), story, SPEED)
