@@ -3,11 +3,15 @@
 # Debian, with buildah on a base made by debootstrap: apt-get install buildah debootstrap.
 # images.sh build | images.sh try: one of the two only.
 # PYTHON: an interpreter with swiftnav[sitl], for the vehicle that the companion's image flies.
+# ARCH=arm64: the companion's image for a Raspberry Pi and no other, without the flight; by emulation, which must have
+# been set up (qemu-user-static, registered with binfmt_misc), and takes a quarter of an hour.
 set -eu
 cd "$(dirname "$0")/.."
 PYTHON=${PYTHON:-.venv/bin/python}
+ARCH=${ARCH:-}
 WORK=$PWD/build/images
 BASE=debian:bookworm-slim
+COMPANION=companion${ARCH:+-$ARCH}
 COMPANION_MAX_MB=400
 mkdir -p "$WORK"
 
@@ -34,19 +38,19 @@ b() { buildah --root "$WORK/store" --runroot "$WORK/run" "$@"; }
 
 # A Debian as small as the slim image, that trusts whom this machine trusts (a mirror's certificate, say).
 make_base() {
-    BASE=localhost/debian:bookworm
+    BASE=localhost/debian:bookworm${ARCH:+-$ARCH}
     if b images -q "$BASE" >/dev/null 2>&1; then return; fi
     say "base: Debian 12 by debootstrap"
     rm -rf "$WORK/base"
     # DEBIAN_MIRROR: where packages come from, if not where debootstrap looks by itself.
-    debootstrap --variant=minbase --include=ca-certificates bookworm "$WORK/base" \
+    debootstrap ${ARCH:+"--arch=$ARCH"} --variant=minbase --include=ca-certificates bookworm "$WORK/base" \
         ${DEBIAN_MIRROR:+"$DEBIAN_MIRROR"} >"$WORK/debootstrap.log"
     cp /etc/ssl/certs/ca-certificates.crt "$WORK/base/etc/ssl/certs/"
     chroot "$WORK/base" apt-get clean
     for left_over in var/lib/apt/lists usr/share/doc usr/share/man usr/share/locale usr/share/info; do
         find "$WORK/base/$left_over" -mindepth 1 -delete
     done
-    container=$(b from scratch)
+    container=$(b from ${ARCH:+--arch "$ARCH"} scratch)
     b add -q "$container" "$WORK/base" / >/dev/null
     b commit -q "$container" "$BASE" >/dev/null
     b rm "$container" >/dev/null
@@ -57,10 +61,10 @@ make_base() {
 build() {
     say "build swiftnav-$1"
     if [ "$ENGINE" = buildah ]; then
-        b bud -q --format docker --build-arg BASE="$BASE" ${3:+--build-arg "$3"} \
+        b bud -q --format docker ${ARCH:+--arch "$ARCH"} --build-arg BASE="$BASE" ${3:+--build-arg "$3"} \
             -f "docker/${2:-$1}.Dockerfile" -t "swiftnav-$1" .
     else
-        "$ENGINE" build -q ${3:+--build-arg "$3"} -f "docker/${2:-$1}.Dockerfile" -t "swiftnav-$1" .
+        "$ENGINE" build -q ${ARCH:+--platform "linux/$ARCH"} ${3:+--build-arg "$3"} -f "docker/${2:-$1}.Dockerfile" -t "swiftnav-$1" .
     fi
 }
 
@@ -77,7 +81,7 @@ run() {
 }
 
 container_of() {
-    b from --name "try-$1" --pull-never "localhost/swiftnav-$1:latest" 2>/dev/null || echo "try-$1"
+    b from --name "try-$1" --pull-never ${ARCH:+--arch "$ARCH"} "localhost/swiftnav-$1:latest" 2>/dev/null || echo "try-$1"
 }
 
 size_mb() {
@@ -90,25 +94,27 @@ size_mb() {
 
 try_companion() {
     say "companion: nothing of the simulator, unprivileged, under $COMPANION_MAX_MB MB"
-    size=$(size_mb companion)
+    size=$(size_mb "$COMPANION")
     echo "$size MB"
     [ "$size" -lt "$COMPANION_MAX_MB" ]
     say "companion: --check without a vehicle must say so, with exit code 6"
     code=0
-    run companion "$WORK" python -m companion --check --check-time 1 --vehicle udpin://127.0.0.1:14599 || code=$?
+    run "$COMPANION" "$WORK" python -m companion --check --check-time 1 --vehicle udpin://127.0.0.1:14599 || code=$?
     [ "$code" = 6 ]
+    if [ -n "$ARCH" ]; then return; fi # an emulated companion is too slow for the operator's patience
     say "companion: flies trajectory1 against a vehicle outside it"
     rm -rf "$WORK/flight"
     if [ "$ENGINE" = buildah ]; then
         "$PYTHON" docker/fly_with.py "$WORK/flight" buildah --root "$WORK/store" --runroot "$WORK/run" \
-            run -v "$WORK:$WORK" "$(container_of companion)" -- python -m companion
+            run -v "$WORK:$WORK" "$(container_of "$COMPANION")" -- python -m companion
     else
         "$PYTHON" docker/fly_with.py "$WORK/flight" \
-            "$ENGINE" run --rm --network host -v "$WORK:$WORK" swiftnav-companion
+            "$ENGINE" run --rm --network host -v "$WORK:$WORK" "swiftnav-$COMPANION"
     fi
 }
 
 try_others() {
+    for image in sitl train relay; do echo "$image: $(size_mb "$image") MB"; done
     say "sitl: flies trajectory1 by itself"
     if [ "$ENGINE" = buildah ]; then # in a network of its own, as the other engines have it
         unshare --net sh -c 'ip link set lo up && exec "$@"' sh \
@@ -135,11 +141,14 @@ try_others() {
 choose_engine
 say "with $ENGINE"
 if [ "${1:-build}" = build ]; then
-    for image in companion sitl relay; do build "$image"; done
-    build train sitl EXTRA=train
+    build "$COMPANION" companion
+    if [ -z "$ARCH" ]; then
+        for image in sitl relay; do build "$image"; done
+        build train sitl EXTRA=train
+    fi
 fi
 if [ "${1:-try}" = try ]; then
     try_companion
-    try_others
+    if [ -z "$ARCH" ]; then try_others; fi
 fi
 say "done"
