@@ -205,7 +205,7 @@ class Autopilot:
             self.steering.settle()
 
     def _detect_ground(self, state: VehicleState, contact: bool) -> None:
-        if not self._detector.update(state, contact, self._wants_up()):
+        if not self._detector.update(state, contact, self._wants_up(), self.guardian.position_ok):
             return
         if self.landed:
             self._landed_s = state.t_s

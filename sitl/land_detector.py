@@ -21,12 +21,15 @@ class LandDetector:
         self.landed = True
         self._since_s = math.inf  # since when the facts have spoken against ``landed``
 
-    def update(self, state: VehicleState, contact: bool, climbing: bool) -> bool:
-        """Judge one instant; ``climbing`` says that the autopilot wants to go up. True when ``landed`` changed."""
+    def update(self, state: VehicleState, contact: bool, climbing: bool, speed_known: bool = True) -> bool:
+        """Judge one instant; True when ``landed`` changed.
+
+        ``climbing``: the autopilot wants to go up. ``speed_known``: its horizontal velocity means something.
+        """
         if self.landed:
             against, needed_s = not contact, FLYING_AFTER_S
         else:
-            against, needed_s = contact and not climbing and _at_rest(state), LANDED_AFTER_S
+            against, needed_s = contact and not climbing and _at_rest(state, speed_known), LANDED_AFTER_S
         if not against:
             self._since_s = math.inf
             return False
@@ -38,6 +41,7 @@ class LandDetector:
         return True
 
 
-def _at_rest(state: VehicleState) -> bool:
+def _at_rest(state: VehicleState, speed_known: bool) -> bool:
     north_m_s, east_m_s, down_m_s = state.vel_ned_m_s.tolist()
-    return math.hypot(north_m_s, east_m_s) < SPEED_XY_MAX_M_S and abs(down_m_s) < SPEED_Z_MAX_M_S
+    level = not speed_known or math.hypot(north_m_s, east_m_s) < SPEED_XY_MAX_M_S
+    return level and abs(down_m_s) < SPEED_Z_MAX_M_S

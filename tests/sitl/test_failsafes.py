@@ -242,6 +242,16 @@ def test_magnetometer_or_barometer_lost_during_a_mission_does_not_end_it(unit: i
     assert not flight.ap.ready  # but nobody takes off like this
 
 
+def test_gps_lost_high_up_lands_as_well_though_the_velocity_drifts_by_then() -> None:
+    flight = Flight(MIS_TAKEOFF_ALT=20.0)
+    flight.run(15.0)
+    flight.break_(mav.FAILURE_UNIT_SENSOR_GPS)
+    flight.down()
+    north_m_s, east_m_s, _ = flight.sim.state.vel_ned_m_s
+    assert math.hypot(north_m_s, east_m_s) > 1.5, "more than the land detector calls rest"
+    assert flight.texts[-2:] == ["Landing detected", "Disarmed by landing"]
+
+
 def test_a_gps_that_returns_gives_the_mode_back() -> None:
     flight = Flight()
     flight.break_(mav.FAILURE_UNIT_SENSOR_GPS, mav.FAILURE_TYPE_STUCK)
