@@ -31,8 +31,8 @@ CLIENTS = {
     "4.1": Path(sys.executable),
 }
 CHAPTERS = ("ground", "missions", "offboard", "flights")
-SPEED = "12"
-# Silences that a client counts in seconds of its own clock, and this vehicle twelve times as fast.
+SPEED = "15"
+# Silences that a client counts in seconds of its own clock, and this vehicle fifteen times as fast.
 PATIENCE = "1\t1\tCOM_OF_LOSS_T\t30.0\t9\n1\t1\tCOM_RC_LOSS_T\t30.0\t9\n1\t1\tCOM_DL_LOSS_T\t300\t6\n"
 READY_WALL_S, CHAPTER_WALL_S = 60.0, 200.0
 WITHOUT_A_VEHICLE = {"show_debug_output.py"}  # its address is wrong on purpose

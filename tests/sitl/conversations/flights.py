@@ -7,7 +7,7 @@ from pathlib import Path
 from conversations.client import Vehicle, finish, kinds
 from conversations.conversation import Conversation
 
-HEIGHT_M = 5.0
+HEIGHT_M = 4.0
 STICK_PERIOD_S = 0.05
 
 
@@ -46,6 +46,15 @@ async def it_tells_its_height_its_mode_and_whether_it_flies(vehicle: Vehicle) ->
     assert max(heights) == round(HEIGHT_M)
     assert heights[-1] == 0
     assert [mode for mode in dict.fromkeys(modes) if mode != "HOLD"] == ["TAKEOFF", "LAND"]
+
+
+async def the_log_of_a_flight_is_downloaded(vehicle: Vehicle) -> None:
+    logs = await vehicle.log_files.get_entries()
+    assert logs, "one for each time it was armed"
+    copy = Path("copy.ulg").resolve()
+    await finish(vehicle.log_files.download_log_file(logs[0], str(copy)))
+    assert copy.read_bytes().startswith(b"ULog")
+    assert copy.stat().st_size == logs[0].size_bytes
 
 
 async def it_goes_to_a_place(vehicle: Vehicle) -> None:
@@ -108,7 +117,6 @@ async def it_follows_somebody(vehicle: Vehicle) -> None:
     await vehicle.until(lambda: abs(vehicle.place_ned_m[2] + 8.0) < 1.0)
     await follow.stop()
     await vehicle.until(lambda: vehicle.mode == "HOLD")
-    await vehicle.down()
 
 
 async def it_comes_down_without_gps(vehicle: Vehicle) -> None:
@@ -124,22 +132,13 @@ async def it_comes_down_without_gps(vehicle: Vehicle) -> None:
     await vehicle.param.set_param_int("SYS_FAILURE_EN", 0)
 
 
-async def the_log_of_a_flight_is_downloaded(vehicle: Vehicle) -> None:
-    logs = await vehicle.log_files.get_entries()
-    assert logs, "one for each time it was armed"
-    copy = Path("copy.ulg").resolve()
-    await finish(vehicle.log_files.download_log_file(logs[0], str(copy)))
-    assert copy.read_bytes().startswith(b"ULog")
-    assert copy.stat().st_size == logs[0].size_bytes
-
-
 CONVERSATIONS = (
     Conversation(it_takes_off_and_lands, ("takeoff_and_land.py", "asyncio/takeoff_and_land.py")),
     Conversation(it_tells_its_height_its_mode_and_whether_it_flies, ("telemetry_takeoff_and_land.py",)),
+    Conversation(the_log_of_a_flight_is_downloaded, ("logfile_download.py",)),
     Conversation(it_goes_to_a_place, ("goto.py",)),
     Conversation(it_orbits_and_returns, ("do_orbit.py",)),
     Conversation(it_is_flown_by_sticks, ("manual_control.py",)),
     Conversation(it_follows_somebody, ("follow_me_example.py",)),
-    Conversation(the_log_of_a_flight_is_downloaded, ("logfile_download.py",)),
     Conversation(it_comes_down_without_gps, ("failure_injection.py",)),
 )

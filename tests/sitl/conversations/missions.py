@@ -9,7 +9,7 @@ from typing import Any
 from conversations.client import NATIVE, Vehicle, first, kinds, refusal
 from conversations.conversation import Conversation
 
-HEIGHT_M = 6.0
+HEIGHT_M = 4.0
 TAKE_OFF, WAYPOINT, RALLY, RELATIVE = 22, 16, 5100, 6
 CORNER, CIRCLE = 5001, 5003  # of a fence
 PLACES_M = ((0.0, 0.0), (15.0, 0.0), (15.0, 10.0))

@@ -7,7 +7,7 @@ from typing import Any
 from conversations.client import Vehicle, kinds, refusal
 from conversations.conversation import Conversation
 
-HEIGHT_M = 5.0
+HEIGHT_M = 4.0
 LEGS = ((0.0, 0.0), (6.0, 0.0), (6.0, 4.0))
 RADIUS_M, TURN_S = 4.0, 10.0  # of the circle that is flown by position, velocity and acceleration
 HOVER = 0.5  # thrust that lifts a little or not at all
@@ -112,7 +112,7 @@ async def by_attitude_and_thrust(vehicle: Vehicle) -> None:
     offboard, (north_m, _, down_m) = vehicle.offboard, vehicle.place_ned_m
     await steered(vehicle, offboard.set_attitude(setpoint("Attitude", 0.0, 0.0, 0.0, HOVER)))
     await offboard.set_attitude(setpoint("Attitude", 0.0, 0.0, 0.0, 0.6))
-    await vehicle.until(lambda: vehicle.place_ned_m[2] < down_m - 5.0)
+    await vehicle.until(lambda: vehicle.place_ned_m[2] < down_m - 2.0)
     await offboard.set_attitude(setpoint("Attitude", 0.0, -15.0, 0.0, HOVER))  # nose down: forward, north
     await vehicle.until(lambda: vehicle.place_ned_m[0] > north_m + 3.0)
     await let_go(vehicle)
