@@ -11,13 +11,14 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from companion.core.geometry import length, resample
 from companion.core.gridmap import NEVER, GridMap, MapParams, cells_of, centres, occupied
 from companion.core.params import param
 from companion.core.types import F64
-from companion.policy.grid_path import BLOCKED, LIMIT, clearance_field, reach_from, walk_back
+from companion.policy.blocks import block_of, cells_back, cells_of_blocks, in_blocks, reach_over
+from companion.policy.centring import centred, distances, opened
+from companion.policy.grid_path import BLOCKED, LIMIT, Reach, clearances, nearest_cells, reach_from, walk_back
 from companion.policy.interface import WAYPOINTS, Proposal, Query
 
 
@@ -44,9 +45,18 @@ class ExpertParams:
 
 BORDER_CELLS = 2  # paths to a goal outside the map end in this rim
 CHORD_RELAX = (1.0, 2.0, 4.0)
-QUARTERS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
+SEARCH_M = 0.1  # finer cells are searched in blocks of this edge
 CHORD_POINTS = 20  # of the path that one chord replaces, at most
 UNREACHED = 4.0  # cost a cell from where a way ends to a goal on the map: that is approached as near as possible
+
+
+@dataclass(frozen=True, slots=True)
+class _Hits:
+    """What the clearance was measured from."""
+
+    grid: GridMap
+    nearest_cell: NDArray[np.int32] | None  # (n, n) of the nearest hit; None: there is none
+    places_ne_m: F64  # (k, 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +66,7 @@ class _Field:
     cost: F64  # (n, n)
     clearance_m: F64  # (n, n)
     hard_m: float
-    hits_ne_m: F64  # (k, 2) what the clearance was measured from
+    hits: _Hits
 
 
 class GeometricExpert:
@@ -71,9 +81,10 @@ class GeometricExpert:
     def propose(self, query: Query, memory: F64 | None) -> tuple[Proposal | None, F64 | None]:
         """Five waypoints along the cheapest path; see ``Policy.propose``."""
         grid, hits = _with_hazards(query, occupied(query.grid, query.state.t_s, self._map))
-        clearance, hits_ne_m = clearance_field(grid, hits), grid.hit_ne_m[hits].astype(np.float64)
+        known = _Hits(grid, nearest_cells(hits) if hits.any() else None, grid.hit_ne_m[hits].astype(np.float64))
+        clearance = np.full(hits.shape, np.inf) if known.nearest_cell is None else clearances(grid, known.nearest_cell)
         for margin in (self._params.margin_m, self._params.tight_m):
-            field = _field(query, clearance, hits_ne_m, query.radius_m + margin, self._params)
+            field = _field(query, clearance, known, query.radius_m + margin, self._params)
             path = _plan(query, field, memory, self._params)
             if path is not None:
                 return Proposal(_cut(_joined(query.prefix_ne_m, path), self._params)), path
@@ -91,18 +102,21 @@ def _with_hazards(query: Query, hits: NDArray[np.bool_]) -> tuple[GridMap, NDArr
     return replace(query.grid, hit_ne_m=hit_ne_m), hits
 
 
-def _field(query: Query, clearance_m: F64, hits_ne_m: F64, hard_m: float, params: ExpertParams) -> _Field:
+def _field(query: Query, clearance_m: F64, hits: _Hits, hard_m: float, params: ExpertParams) -> _Field:
     """Cost per cell: length, nearness to hits, the unknown, and walls near by."""
     comfort_m = query.radius_m + params.comfort_m
-    lack = np.clip((comfort_m - clearance_m) / (comfort_m - query.radius_m), 0.0, 1.0)
-    cost = 1.0 + params.comfort_cost * lack * lack
+    cost = comfort_m - clearance_m
+    cost /= comfort_m - query.radius_m
+    np.minimum(np.maximum(cost, 0.0, out=cost), 1.0, out=cost)  # how much is lacking
+    cost *= params.comfort_cost * cost
+    cost += 1.0
     grid = query.grid
     cost += params.unknown_cost * ((grid.free_t <= NEVER) & (grid.hit_t <= NEVER))
     north, east = centres(grid)
     dn, de = north - query.state.pos_ned_m[0], east - query.state.pos_ned_m[1]
     square = (dn * dn)[:, None] + (de * de)[None, :]
-    if params.push_m > 0.0:
-        clearance_m = _opened(grid, clearance_m, hits_ne_m, hard_m)
+    if params.push_m > 0.0 and hits.nearest_cell is not None:
+        clearance_m = opened(hits.grid, clearance_m, hits.nearest_cell, hard_m)
     tight = clearance_m < hard_m
     near = square < params.hard_range_m**2
     cost += params.far_cost * (tight & ~near)
@@ -112,21 +126,7 @@ def _field(query: Query, clearance_m: F64, hits_ne_m: F64, hard_m: float, params
         blocked &= (clearance_m < here_m - grid.cell_m / 2) | (square > 1.0)
         cost += params.far_cost * (tight & near)
     cost[blocked] = BLOCKED
-    return _Field(cost, clearance_m, hard_m, hits_ne_m)
-
-
-def _opened(grid: GridMap, clearance_m: F64, hits_ne_m: F64, hard_m: float) -> F64:
-    """Clearances, of cells that just miss ``hard_m`` the best of four places inside: gaps narrow as cells stay open."""
-    row, column = np.nonzero((clearance_m < hard_m) & (clearance_m > hard_m - 0.5 * grid.cell_m))
-    if len(row) == 0:
-        return clearance_m
-    north, east = centres(grid)
-    middle = np.stack([north[row], east[column]], axis=1)
-    places = middle[:, None, :] + grid.cell_m / 4 * QUARTERS
-    distance, _ = cKDTree(hits_ne_m).query(places.reshape(-1, 2))
-    opened = clearance_m.copy()
-    opened[row, column] = np.maximum(clearance_m[row, column], distance.reshape(-1, len(QUARTERS)).max(axis=1))
-    return opened
+    return _Field(cost, clearance_m, hard_m, hits)
 
 
 def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) -> F64 | None:
@@ -142,7 +142,9 @@ def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) ->
     if kept is not None:
         worth = _path_cost(kept, query, field, params, beyond) / (params.keep_ratio * grid.cell_m)
         detour = worth - float(ahead.ravel()[source]) - (beyond - 1.0) * float(ahead.min())
-    cells = _cheapest(field.cost, source, ahead, detour, beyond) if detour > 0.0 else None
+    cells = _cheapest(field.cost, source, ahead, detour, beyond, _block(grid)) if detour > 0.0 else None
+    if cells is None and kept is None and _block(grid) > 1:
+        cells = _cheapest(field.cost, source, ahead, detour, beyond, 1)
     return kept if cells is None else _smooth(_places(cells, query), query, field, params)
 
 
@@ -155,20 +157,41 @@ def _straight_cells(query: Query) -> F64:
     return straight
 
 
-def _cheapest(cost: F64, source: int, ahead: F64, detour: float, beyond: float) -> list[int] | None:
+def _cheapest(cost: F64, source: int, ahead: F64, detour: float, beyond: float, block: int) -> list[int] | None:
     """Cells of the cheapest way off the map towards the goal, or onto it; None if it takes more than ``detour``.
 
     ``detour`` is counted beyond the straight way, ``beyond`` is the cost of a metre from the map's rim to the goal.
+    ``block``: the way is looked for over blocks of so many cells a side.
     """
-    reach = reach_from(cost, source, ahead, detour)
-    least = float(ahead.min())
+    goal = int(ahead.argmin())
+    least = float(ahead.ravel()[goal])
+    if block == 1:
+        reach = reach_from(cost, source, ahead, detour)
+        best = _best_end(reach, source, ahead, least, detour, beyond)
+        return None if best is None else walk_back(reach, best)
+    on_map = least < 1.0 and cost.ravel()[goal] < BLOCKED
+    blocks = in_blocks(cost, block, (source, goal) if on_map else (source,))
+    ahead, source = ahead.take(cells_of_blocks(blocks)), block_of(blocks, source)
+    reach = reach_over(blocks, source, ahead, detour)
+    best = _best_end(reach, source, ahead, least, detour, beyond)
+    return None if best is None else cells_back(blocks, reach, best)
+
+
+def _best_end(reach: Reach, source: int, ahead: F64, least: float, detour: float, beyond: float) -> int | None:
+    """Where the cheapest way ends; ``least`` of ``ahead`` tells whether the goal is on the map."""
     inside = least < 1.0
-    cells = np.arange(cost.size) if inside else _rim(cost.shape[0])
+    cells = np.arange(ahead.size) if inside else _rim(len(ahead))
     total = reach.cost[cells] + (UNREACHED if inside else beyond) * ahead.ravel()[cells]
     best = int(np.argmin(total))
     if not total[best] < min(detour, LIMIT) + ahead.ravel()[source] + (beyond - 1.0) * least:
         return None
-    return walk_back(reach, int(cells[best]))
+    return int(cells[best])
+
+
+def _block(grid: GridMap) -> int:
+    """Cells along the side of a block; the grid's side is a multiple of it."""
+    most = max(1, math.floor(SEARCH_M / grid.cell_m + 1e-6))
+    return max(side for side in range(1, most + 1) if len(grid.free_t) % side == 0)
 
 
 @lru_cache(maxsize=4)
@@ -226,10 +249,8 @@ def _path_cost(path: F64, query: Query, field: _Field, params: ExpertParams, bey
 def _fine_cost(places: F64, query: Query, field: _Field, params: ExpertParams) -> F64:
     """Cost at places by their own distance to the hits, not by that of their cells; BLOCKED inside the hull."""
     cost = np.minimum(_sample(query.grid, field.cost, places), 1.0 + params.comfort_cost + params.unknown_cost)
-    if len(field.hits_ne_m):
-        near = np.hypot(*(places - query.state.pos_ned_m[:2]).T) < params.hard_range_m
-        clearance, _ = cKDTree(field.hits_ne_m).query(places, distance_upper_bound=query.radius_m)
-        cost[near & (clearance < query.radius_m)] = BLOCKED
+    near = np.hypot(*(places - query.state.pos_ned_m[:2]).T) < params.hard_range_m
+    cost[near & (distances(places, field.hits.places_ne_m, query.radius_m) < query.radius_m)] = BLOCKED
     return cost
 
 
@@ -240,8 +261,9 @@ def _smooth(path: F64, query: Query, field: _Field, params: ExpertParams) -> F64
     """
     if len(path) <= 2:
         return path.copy()
-    if params.push_m > 0.0 and len(field.hits_ne_m):
-        return _centred(path, field.hits_ne_m, query.radius_m + params.push_to_m, params)
+    if params.push_m > 0.0 and field.hits.nearest_cell is not None:
+        want_m = query.radius_m + params.push_to_m
+        return centred(path, field.hits.places_ne_m, want_m, params.push_m, params.sweeps)
     grid = query.grid
     floor = np.minimum(_sample(grid, field.clearance_m, path), field.hard_m + 2 * grid.cell_m) - grid.cell_m / 4
     for _ in range(params.sweeps):
@@ -250,19 +272,6 @@ def _smooth(path: F64, query: Query, field: _Field, params: ExpertParams) -> F64
         fine = _sample(grid, field.clearance_m, moved) >= floor
         fine[0] = fine[-1] = True
         path = np.where(fine[:, None], moved, path)
-    return path
-
-
-def _centred(path: F64, hits_ne_m: F64, want_m: float, params: ExpertParams) -> F64:
-    """Every sweep: to the middle of the neighbours, then off the nearest hit, by ``push_m`` at most."""
-    path = path.copy()
-    tree = cKDTree(hits_ne_m)
-    for _ in range(params.sweeps):
-        path[1:-1] = 0.5 * path[1:-1] + 0.25 * (path[2:] + path[:-2])
-        distance, nearest = tree.query(path[1:-1], distance_upper_bound=want_m)
-        near = np.flatnonzero(distance < want_m)
-        step = np.minimum(want_m - distance[near], params.push_m) / np.maximum(distance[near], 1e-6)
-        path[1 + near] += (path[1 + near] - hits_ne_m[nearest[near]]) * step[:, None]
     return path
 
 
@@ -282,27 +291,27 @@ def _cut(path: F64, params: ExpertParams) -> F64:
 
 def _chords(path: F64, tolerance_m: float, length_m: float) -> F64:
     """Greedy: each chord as long as the path between its ends stays within the tolerance."""
-    places = path.tolist()
     picked: list[int] = []
     at, used = 0, 0.0
     while at < len(path) - 1 and len(picked) < WAYPOINTS and used < length_m:
-        end = at + 1
-        while end + 1 < len(path) and end - at < CHORD_POINTS and _leave_m(places[at : end + 2]) <= tolerance_m:
-            end += 1
-        used += math.dist(places[at], places[end])
+        end = at + _chord(path[at : at + CHORD_POINTS + 1], tolerance_m)
+        used += math.dist(path[at].tolist(), path[end].tolist())
         picked.append(end)
         at = end
     return path[picked]
 
 
-def _leave_m(places: list[list[float]]) -> float:
-    """How far a stretch of path leaves the chord between its ends."""
-    (north, east), *between, (end_north, end_east) = places
-    dn, de = end_north - north, end_east - east
-    chord_m = math.hypot(dn, de)
-    if chord_m < 1e-9:
-        return math.inf
-    return max(abs((n - north) * de - (e - east) * dn) for n, e in between) / chord_m
+def _chord(path: F64, tolerance_m: float) -> int:
+    """Last place of a stretch up to which every chord from its beginning stays within the tolerance; at least 1."""
+    if len(path) <= 2:
+        return 1
+    dn, de = path[1:, 0] - path[0, 0], path[1:, 1] - path[0, 1]
+    off_m2 = np.abs(dn[None, :] * de[:, None] - de[None, :] * dn[:, None])  # chord to each place, and each place
+    chord_m = np.array([math.hypot(*end) for end in zip(dn.tolist(), de.tolist(), strict=True)])
+    most_m2 = np.tril(off_m2).max(axis=1)  # of the places before the chord's end
+    within = (chord_m >= 1e-9) & (most_m2 / np.maximum(chord_m, 1e-9) <= tolerance_m)
+    within[0] = True
+    return len(within) if within.all() else int(within.argmin())
 
 
 def _cell(grid: GridMap, point_ne_m: F64) -> int:
