@@ -45,7 +45,7 @@ class ExpertParams:
 
 BORDER_CELLS = 2  # paths to a goal outside the map end in this rim
 CHORD_RELAX = (1.0, 2.0, 4.0)
-SEARCH_M = 0.1  # finer cells are searched in blocks of this edge
+FINE_M = 0.1  # cells up to this edge are searched in blocks of two
 CHORD_POINTS = 20  # of the path that one chord replaces, at most
 UNREACHED = 4.0  # cost a cell from where a way ends to a goal on the map: that is approached as near as possible
 
@@ -189,9 +189,8 @@ def _best_end(reach: Reach, source: int, ahead: F64, least: float, detour: float
 
 
 def _block(grid: GridMap) -> int:
-    """Cells along the side of a block; the grid's side is a multiple of it."""
-    most = max(1, math.floor(SEARCH_M / grid.cell_m + 1e-6))
-    return max(side for side in range(1, most + 1) if len(grid.free_t) % side == 0)
+    """Cells along the side of a block."""
+    return 2 if grid.cell_m < FINE_M + 1e-6 and len(grid.free_t) % 2 == 0 else 1
 
 
 @lru_cache(maxsize=4)
