@@ -70,6 +70,7 @@ format: $(VENV)/.dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
+test: export CI := 1  # the same random examples every time
 test: check $(VENV3)/.ready
 	$(BIN)/pytest -n 2 -m "not slow and not live"
 	SWIFTNAV_MAVSDK3=$(VENV3)/bin/python $(BIN)/pytest -m "live and not slow" --reruns 3 --reruns-delay 1

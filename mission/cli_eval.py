@@ -21,6 +21,7 @@ SUMMED_UP = (
     ("switches_per_min", "of nav modes"),
     ("switches_bound_per_min", "what the arbiter guarantees"),
     ("kept", "verdicts of the checker, share"),
+    ("next", "its next choices"),
     ("modified", ""),
     ("escape", ""),
     ("refused", ""),

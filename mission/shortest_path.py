@@ -127,7 +127,7 @@ def _dijkstra(free: NDArray[np.bool_], ends: NDArray[np.intp]) -> F64 | None:
     index = np.arange(free.size).reshape(free.shape)
     rows, columns, costs = [], [], []
     for down, right in NEIGHBOURS:
-        here, there = _shifted(free.shape, down, right)
+        here, there = shifted(free.shape, down, right)
         open_ = free[here] & free[there]
         rows.append(index[here][open_])
         columns.append(index[there][open_])
@@ -144,7 +144,7 @@ def _dijkstra(free: NDArray[np.bool_], ends: NDArray[np.intp]) -> F64 | None:
     return np.stack(np.unravel_index(chain[::-1], free.shape), axis=1).astype(np.float64)
 
 
-def _shifted(shape: tuple[int, ...], down: int, right: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+def shifted(shape: tuple[int, ...], down: int, right: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
     """Two views of a grid: cells, and what lies ``down`` rows and ``right`` columns from them."""
     height, width = shape
     here = (slice(0, height - down), slice(max(0, -right), width - max(0, right)))

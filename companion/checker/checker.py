@@ -25,6 +25,7 @@ class VerdictKind(StrEnum):
     """Every possible answer."""
 
     KEPT = "kept"
+    NEXT = "next"  # not the proposal but one of the policy's next choices, as it is
     MODIFIED = "modified"
     ESCAPE = "escape"
     REFUSED = "refused"
@@ -134,7 +135,7 @@ def _other(query: CheckQuery, margins_m: tuple[float, ...], params: CheckerParam
     """The policy's first next choice that passes as it is at one of the margins, and which one."""
     for choice, waypoints in enumerate(query.others_ned_m, start=1):
         path = _path(query.start_ned_m, waypoints)
-        candidate = None if path is None else _judge(VerdictKind.KEPT, path, query, margins_m, params)
+        candidate = None if path is None else _judge(VerdictKind.NEXT, path, query, margins_m, params)
         if candidate is not None:
             return choice, candidate
     return 0, None

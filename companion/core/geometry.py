@@ -126,6 +126,17 @@ def part(path_ned_m: F64, s_from_m: float, s_to_m: float = math.inf) -> F64:
     return np.array(vertices)
 
 
+def extended(path_ned_m: F64, by_m: float) -> F64:
+    """The polyline with its last piece made longer; itself where there is no piece or nothing to add."""
+    pieces = segments(path_ned_m)
+    if not pieces or not by_m > 0.0:
+        return path_ned_m
+    last = pieces[-1]
+    longer = np.array(path_ned_m, dtype=np.float64)
+    longer[-1] += by_m * np.array([last.dir_north, last.dir_east])
+    return longer
+
+
 def resample(path_ned_m: F64, spacing_m: float) -> F64:
     """Vertices at equal arc length, not farther apart than spacing_m; first and last vertex kept."""
     s = arc_lengths(path_ned_m)

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from companion.checker.checker import CheckQuery, Verdict, check, recheck
+from companion.checker.checker import CheckQuery, Verdict, VerdictKind, check, recheck
 from companion.checker.params import CheckerParams
 from companion.core import geometry
 from companion.core.params import ParamError, nearest
@@ -112,10 +112,16 @@ def settle(
         verdict = check(replace(asked, proposal_ned_m=None, others_ned_m=(), escape_ned_m=escape), params.checker)
     path = None
     if verdict.path_ned_m is not None and verdict.margin_m is not None:
-        lasts_s, used_up_m = params.policy.wear(guarded)
+        lasts_s, used_up_m, run_out_m = params.policy.wear(guarded)
         if not guarded and proposal is not None and proposal.lasts_s is not None:
             lasts_s = proposal.lasts_s
-        path = Path(verdict.path_ned_m, 0.0, verdict.margin_m, state.t_s, lasts_s, used_up_m)
+        vertices = verdict.path_ned_m
+        if (
+            verdict.kind is VerdictKind.ESCAPE
+            or math.dist(vertices[-1].tolist(), query.goal_ne_m[:2].tolist()) < used_up_m
+        ):
+            run_out_m = 0.0
+        path = Path(vertices, 0.0, verdict.margin_m, state.t_s, lasts_s, used_up_m, run_out_m)
     memory = replace(memory, policy=answer.memory, guard=way, decisions=memory.decisions + 1)
     return memory, replace(engaged, path=path, tried_t_s=state.t_s), Decision(asked.proposal_ned_m, verdict, guarded)
 

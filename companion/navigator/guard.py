@@ -19,6 +19,7 @@ from companion.core.types import F64
 from companion.guidance.limits import LimitsParams
 
 REJOIN_M = 1.0  # places of the expert's path that are tried, this far apart
+FLOWN_AS_IS = (VerdictKind.KEPT, VerdictKind.NEXT)
 STEP_M = 0.25  # between two places of a way whose clearance is looked at
 
 
@@ -34,7 +35,7 @@ def steps_in(policy: Verdict, guard: Verdict, asked: CheckQuery, pace: "Pace", r
     """
     if guard.path_ned_m is None or guard.margin_m is None or guard.kind is VerdictKind.ESCAPE:
         return False
-    if policy.path_ned_m is None or policy.kind is not VerdictKind.KEPT or policy.margin_m is None:
+    if policy.path_ned_m is None or policy.kind not in FLOWN_AS_IS or policy.margin_m is None:
         return True
     if policy.margin_m < guard.margin_m:
         return True

@@ -23,6 +23,7 @@ class Path:
     decided_t_s: float
     lasts_s: float  # then it is planned anew
     used_up_m: float  # also with less than this left
+    run_out_m: float = 0.0  # flown as if it went on straight for so long: it is replaced before it ends
 
 
 @dataclass(frozen=True, slots=True)

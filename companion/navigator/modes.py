@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from companion.arbiter.facts import Facts, Thresholds, landing_safe
+from companion.core import geometry
 from companion.core.task import Task
 from companion.core.types import NavMode, Setpoint, VehicleState
 from companion.guidance import landing, limits, line
@@ -95,7 +96,8 @@ def _follow(memory: Memory, engaged: Engagement, scene: Scene, asked: Asked | No
         held = _held(memory, replace(engaged, path=None), scene)
         return replace(held, decision=decision)
     margin_m = min(params.vehicle.corridor_m, path.margin_m)
-    route = Route(path.vertices_ne_m, path.s_m, scene.task.cruise_m_s, engaged.down_m, margin_m)
+    vertices = geometry.extended(path.vertices_ne_m, path.run_out_m)
+    route = Route(vertices, path.s_m, scene.task.cruise_m_s, engaged.down_m, margin_m)
     course = course_along(path.vertices_ne_m, path.s_m)
     yaw = turned(memory.yaw_sp_rad, course, scene.dt_s, params.vehicle.yaw_rate_rad_s)
     tracked = track(route, scene.state, scene.percept, yaw, params)

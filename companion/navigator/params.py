@@ -42,14 +42,22 @@ class PolicyParams:
         1.0, "SN_PO_USED_UP", "The expert's path with less than this left is used up", "m", 0.1, 10
     )
     learned_used_up_m: float = param(2.0, "SN_PO_L_USED_UP", "The same for a learned policy", "m", 0.1, 10.0)
+    learned_run_out_m: float = param(
+        4.0,
+        "SN_PO_L_RUN_OUT",
+        "A learned policy's path is flown as if it went straight on, where that is free",
+        "m",
+        0,
+        10,
+    )
     lead_s: float = param(0.4, "SN_PO_LEAD", "A new path leaves the old one this far ahead", "s", 0.0, 2.0)
     rejoin_m: float = param(0.4, "SN_PO_REJOIN", "Farther off the old path than this, plan from the vehicle", "m", 0, 3)
 
-    def wear(self, guarded: bool) -> tuple[float, float]:
-        """Age in s and length left in m at which a path is due to be replaced."""
+    def wear(self, guarded: bool) -> tuple[float, float, float]:
+        """Age in s and length left in m at which a path is due to be replaced, and the run-out in m beyond its end."""
         if guarded or self.name == GeometricExpert.name:
-            return self.horizon_s, self.used_up_m
-        return self.learned_horizon_s, self.learned_used_up_m
+            return self.horizon_s, self.used_up_m, 0.0
+        return self.learned_horizon_s, self.learned_used_up_m, self.learned_run_out_m
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,12 @@ ACTION_SIZE = 2 * WAYPOINTS  # eq. action_mat; of a detour, too: an actor always
 SIDE, TURN, SPACING = 0, 1, 2
 NAMES = ("detour", "waypoints")
 FIT_STEP_M = 0.5  # lengths that the encoder tries
+ASIDES = (1, -1, 2, -2, 3, -3, 4, -4)  # steps of ``aside_rad`` at which a whole detour is a next choice
+SHORT_ASIDES = (0, *ASIDES, 6, -6, 9, -9, 12, -12, 16, -16)  # and a short one: out of a pocket along its wall
+SHORT = 0.6  # of a detour's length: as far as the gap's mouth, where the whole does not fit through yet
+CUT_MAX_M = 0.3  # off a corner
+ROUND_LEAST_M = 0.1  # less is no stretch to begin a curve on
+ROUND_SHARES = np.array([0.25, 0.5, 0.75, 1.0])
 MIRROR = {
     "detour": np.array([-1.0, -1.0, *np.ones(ACTION_SIZE - 2)]),
     "waypoints": np.tile([1.0, -1.0], WAYPOINTS),
@@ -41,24 +47,55 @@ class DecoderParams:
     long_m: float = 6.0
     goal_hint_m: float = 1.0  # a path that ends this near to the goal ends at it
     headings_m: float = 4.0  # length of a path that is just a heading
+    aside_rad: float = 0.15  # between a detour's next choices; 0: it has none
 
 
 def decode(name: str, action: F64, query: Query, params: DecoderParams) -> F64:
     """Five waypoints (5, 2) in local NED for an action (10,); the path begins at the end of the committed stretch."""
     if name == "waypoints":
         return _places(action, query, params)
-    length_m = params.short_m + (params.long_m - params.short_m) * (float(action[SPACING]) + 1.0) / 2.0
-    return arc(params.side_rad * float(action[SIDE]), params.turn_rad * float(action[TURN]), length_m, query, params)
+    return arc(*_meant(action, params), query, params)
 
 
 def proposal(name: str, action: F64, query: Query, params: DecoderParams) -> Proposal:
-    """What the checker is asked about: the committed stretch and the five waypoints of the action."""
-    return Proposal(joined(query, decode(name, action, query, params)))
+    """What the checker is asked about: the committed stretch and the five waypoints of the action.
+
+    A detour comes with next choices, for where it is not kept: the same a little to either side (farther off the goal
+    bearing first), then shorter.
+    """
+    first = joined(query, decode(name, action, query, params))
+    if name != "detour" or params.aside_rad == 0.0:
+        return Proposal(first)
+    side_rad, turn_rad, length_m = _meant(action, params)
+    step_rad = math.copysign(params.aside_rad, side_rad)
+    nexts = [(side_rad + steps * step_rad, length_m) for steps in ASIDES]
+    nexts += [(side_rad + steps * step_rad, SHORT * length_m) for steps in SHORT_ASIDES]
+    return Proposal(first, tuple(joined(query, arc(aside, turn_rad, way_m, query, params)) for aside, way_m in nexts))
 
 
 def joined(query: Query, waypoints_ne_m: F64) -> F64:
-    """The committed stretch, without the place where it begins, and the waypoints that follow it."""
-    return np.concatenate([query.prefix_ne_m[1:], waypoints_ne_m])
+    """From where the committed stretch begins, that place left out, to the last waypoint; the anchor's corner rounded.
+
+    A parabola, tangent to the stretch where it begins and to the way as far beyond the anchor: a corner between short
+    pieces would cost nearly all speed. It cuts the corner by no more than ``CUT_MAX_M``.
+    """
+    prefix, anchor = query.prefix_ne_m, query.prefix_ne_m[-1]
+    way = np.concatenate([anchor[None], waypoints_ne_m])
+    stretch_m = geometry.length(prefix)
+    reach_m = min(stretch_m, geometry.length(way))
+    if reach_m < ROUND_LEAST_M:
+        return np.concatenate([prefix[1:], waypoints_ne_m])
+    turn_rad = wrap_rad(_course(geometry.tangent_at(way, 0.0)) - _course(geometry.tangent_at(prefix, stretch_m)))
+    reach_m = min(reach_m, 2.0 * CUT_MAX_M / max(abs(math.sin(turn_rad / 2.0)), 1e-9))
+    enter, leave = geometry.point_at(prefix, stretch_m - reach_m), geometry.point_at(way, reach_m)
+    share = ROUND_SHARES[:, None]
+    curve = (1.0 - share) ** 2 * enter + 2.0 * share * (1.0 - share) * anchor + share**2 * leave
+    before, after = geometry.part(prefix, 0.0, stretch_m - reach_m), geometry.part(way, reach_m)
+    return np.concatenate([before[1:], curve, after[1:]])
+
+
+def _course(direction: F64) -> float:
+    return math.atan2(float(direction[1]), float(direction[0]))
 
 
 def arc(side_rad: float, turn_rad: float, length_m: float, query: Query, params: DecoderParams) -> F64:
@@ -110,6 +147,12 @@ def mirror_action(name: str, action: F64) -> F64:
     """The action (..., 10) that means the mirror image."""
     mirrored: F64 = action * MIRROR[name]
     return mirrored
+
+
+def _meant(action: F64, params: DecoderParams) -> tuple[float, float, float]:
+    """Side [rad], turn [rad] and length [m] of a detour."""
+    length_m = params.short_m + (params.long_m - params.short_m) * (float(action[SPACING]) + 1.0) / 2.0
+    return params.side_rad * float(action[SIDE]), params.turn_rad * float(action[TURN]), length_m
 
 
 def _places(action: F64, query: Query, params: DecoderParams) -> F64:

@@ -189,8 +189,8 @@ def _decoder_params(data: dict[str, Any], where: str) -> DecoderParams:
     names = tuple(f.name for f in dataclasses.fields(DecoderParams))
     _expect_keys(data, names, f"{where}: decoder_params")
     for key, value in data.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < np.inf:
-            raise PolicyError(f"{where}: decoder_params: {key} = {value!r}, expected a positive number")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < np.inf:
+            raise PolicyError(f"{where}: decoder_params: {key} = {value!r}, expected a number from 0 up")
     return DecoderParams(**data)
 
 

@@ -98,6 +98,7 @@ class Episode:
             "switches_bound": switch_bound(flight.time_s, STABLE, modes.aborts),
             "hasty_switches": modes.hasty,
             "kept": modes.verdicts["kept"],
+            "next": modes.verdicts["next"],
             "modified": modes.verdicts["modified"],
             "escaped": modes.verdicts["escape"],
             "refused": modes.verdicts["refused"],
@@ -153,7 +154,13 @@ class Episode:
             mode = "hold" if engaged.arbiter.hold else str(engaged.arbiter.mode)
             off_m = line.errors(engaged.line, state.pos_ned_m[:2], 0.0).cross_track_m
         return TickFacts(
-            state.t_s, (north_m, east_m), pending.goal_m, pending.percept.d_min_m, mode, self._endpoint, off_m
+            state.t_s,
+            (north_m, east_m),
+            pending.goal_m,
+            pending.percept.d_min_m,
+            mode,
+            self._endpoint,
+            cross_track_m=off_m,
         )
 
     def _arrived(self, pending: navigator.Pending) -> bool:

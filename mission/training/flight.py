@@ -17,6 +17,7 @@ from mission.simulate import GROUND_LIMIT_S, sim_config
 from mission.training import reward
 from mission.training.reward import RewardState, TickFacts
 from mission.training.reward_tables import PAPER_STEP_S, RewardTable
+from mission.training.way_field import way_field
 from sitl.lidar import LidarParams
 from sitl.modes import FlightMode
 from sitl.simulation import Observation, SimConfig, Simulation
@@ -143,7 +144,8 @@ class Flight:
             facts.d_min_m,
             facts.mode,
             facts.endpoint_ne_m,
-            facts.cross_track_m,
+            way_s=self._way_s(),
+            cross_track_m=facts.cross_track_m,
             contact=self.end is End.CONTACT,
             failure=self.end in (End.OUT_OF_BOUNDS, End.ATTITUDE),
         )
@@ -187,6 +189,14 @@ class Flight:
             "rows": dict(self.log.rows),
             "track_ne_m": list(self.log.track_ne_m),
         }
+
+    def _way_s(self) -> float:
+        """What the rest of the way would take; 0 where the table does not ask."""
+        spec = self.spec
+        if spec.table.way == 0.0:
+            return 0.0
+        field = way_field(spec.plan.world, spec.plan.params.vehicle.radius_m, spec.plan.mission.cruise_m_s)
+        return field.at(*self.world_ne_m)
 
     def _down_m(self) -> float:
         task_down_m = self.spec.plan.task.down_m

@@ -184,6 +184,7 @@ NO_MODES: dict[str, Any] = {
     "switches_bound": 0,
     "hasty_switches": 0,
     "kept": 0,
+    "next": 0,
     "modified": 0,
     "escaped": 0,
     "refused": 0,

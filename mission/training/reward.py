@@ -35,6 +35,7 @@ class TickFacts:
     d_min_m: float  # inf when nothing is near
     mode: str  # NavMode, 'hold', or whatever a baseline calls its only mode
     endpoint_ne_m: Place | None = None  # where an RL path ends that was accepted in this tick
+    way_s: float = 0.0  # that the rest of the way would take, by the true map
     cross_track_m: float | None = None  # off the guidance line of the present or last Travel
     contact: bool = False
     failure: bool = False  # out of bounds or attitude
@@ -47,6 +48,7 @@ class RewardState:
     t_s: float
     goal_distance_m: float
     mode: str
+    way_s: float = 0.0
     contact: bool = False
     failure: bool = False
     goal: bool = False  # has been reached
@@ -73,6 +75,7 @@ def start(facts: TickFacts) -> RewardState:
         t_s=facts.t_s,
         goal_distance_m=facts.goal_distance_m,
         mode=facts.mode,
+        way_s=facts.way_s,
         anchor_t_s=facts.t_s,
         anchor_ne_m=facts.pos_ne_m,
         exit_m=facts.goal_distance_m,
@@ -92,6 +95,7 @@ def step(state: RewardState, facts: TickFacts, table: RewardTable) -> tuple[Rewa
         t_s=facts.t_s,
         goal_distance_m=facts.goal_distance_m,
         mode=_mode(state, facts),
+        way_s=facts.way_s,
         contact=facts.contact,
         failure=facts.failure,
     )
@@ -109,6 +113,10 @@ def _step(state: RewardState, facts: TickFacts, table: RewardTable) -> Row:
 
 def _progress(state: RewardState, facts: TickFacts, table: RewardTable) -> Row:
     return state, table.progress * (state.goal_distance_m - facts.goal_distance_m)
+
+
+def _way(state: RewardState, facts: TickFacts, table: RewardTable) -> Row:
+    return state, table.way * (state.way_s - facts.way_s)
 
 
 def _goal(state: RewardState, facts: TickFacts, table: RewardTable) -> Row:
@@ -220,6 +228,7 @@ def _mode(state: RewardState, facts: TickFacts) -> str:
 ROWS: dict[str, Callable[[RewardState, TickFacts, RewardTable], Row]] = {
     "step": _step,
     "progress": _progress,
+    "way": _way,
     "goal": _goal,
     "crash": _crash,
     "failure": _failure,

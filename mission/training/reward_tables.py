@@ -33,6 +33,7 @@ class RewardTable:
     scale: float = 1.0
     step: float = 0.0  # every step
     progress: float = 0.0  # per metre nearer to the goal
+    way: float = 0.0  # per second less of the way that is left, by the true map
     goal: float = 0.0  # nearer than 2 m for the first time
     crash: float = 0.0  # contact: "any" of table 1, "recoverable" of table 2
     failure: float = 0.0  # out of bounds or attitude
@@ -91,8 +92,9 @@ TRAJECTORY2 = replace(
     endpoint_novel_max=5,
 )
 PLAIN = RewardTable("plain", step=-0.01, goal=5.0, crash=-5.0, failure=-5.0)
+WAY = RewardTable("way", step=-0.03, way=0.3, goal=5.0, crash=-5.0, failure=-5.0)
 
-TABLES = {table.name: table for table in (TRAJECTORY1, TRAJECTORY2, TRAJECTORY1_PAPER, TRAJECTORY2_PAPER, PLAIN)}
+TABLES = {table.name: table for table in (TRAJECTORY1, TRAJECTORY2, TRAJECTORY1_PAPER, TRAJECTORY2_PAPER, PLAIN, WAY)}
 VARIANTS = {"default": "", "paper": "_paper"}
 
 

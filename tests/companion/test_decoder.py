@@ -59,11 +59,48 @@ def test_waypoints_are_three_metres_times_the_action_relative_to_the_nose() -> N
     assert path == pytest.approx(np.array([[1.0, 5.0], [-0.5, 5.0], [-2.0, 5.0], [-2.0, 2.0], [1.0, -1.0]]))
 
 
-def test_a_path_begins_where_the_committed_stretch_ends() -> None:
-    asked = query(prefix_ne_m=[(0.0, 0.0), (0.5, 0.5), (1.0, 0.5)], goal_ne_m=(20.0, 0.5))
+def test_a_path_goes_on_where_the_committed_stretch_ends() -> None:
+    asked = query(prefix_ne_m=[(0.0, 0.5), (0.5, 0.5), (1.0, 0.5)], goal_ne_m=(20.0, 0.5))
     offered = proposal("detour", action(), asked, P).waypoints_ne_m
-    assert offered[:2] == pytest.approx(np.array([[0.5, 0.5], [1.0, 0.5]]))
-    assert offered[2:] == pytest.approx(np.array([[1.8, 0.5], [2.6, 0.5], [3.4, 0.5], [4.2, 0.5], [5.0, 0.5]]))
+    assert offered[:, 1] == pytest.approx(0.5)
+    assert (np.diff(offered[:, 0]) > 0.0).all()
+    assert offered[-4:, 0] == pytest.approx([2.6, 3.4, 4.2, 5.0])
+
+
+def test_the_corner_at_the_anchor_is_a_parabola_that_cuts_thirty_centimetres() -> None:
+    asked = query(prefix_ne_m=[(0.0, 0.0), (1.0, 0.0)], goal_ne_m=(1.0, 20.0))
+    offered = proposal("detour", action(), asked, P).waypoints_ne_m
+    reach_m = 0.6 / math.sin(math.pi / 4.0)
+    assert offered[0] == pytest.approx([1.0 - reach_m, 0.0])
+    assert math.dist(offered[2].tolist(), (1.0, 0.0)) == pytest.approx(0.3)
+    assert offered[4] == pytest.approx([1.0, reach_m])
+    assert offered[5:] == pytest.approx(np.array([[1.0, 1.6], [1.0, 2.4], [1.0, 3.2], [1.0, 4.0]]))
+
+
+@given(UNIT, UNIT, UNIT, st.floats(0.0, 1.5))
+def test_rounding_leaves_the_corner_by_no_more_than_thirty_centimetres(
+    side: float, turn: float, spacing: float, stretch_m: float
+) -> None:
+    asked = query(prefix_ne_m=[(0.0, 0.0), (0.6 * stretch_m, 0.0), (stretch_m, 0.0)])
+    sharp = np.concatenate([asked.prefix_ne_m, decode("detour", action(side, turn, spacing), asked, P)])
+    offered = proposal("detour", action(side, turn, spacing), asked, P).waypoints_ne_m
+    whole = np.concatenate([asked.prefix_ne_m[:1], offered])
+    assert geometry.points_to_polyline_distance(sharp, whole).max() <= 0.3 + 1e-9
+    assert offered[-1] == pytest.approx(sharp[-1])
+    assert geometry.length(whole) <= geometry.length(sharp) + 1e-9
+
+
+def test_a_detour_has_next_choices_farther_aside_first_and_then_shorter_ones() -> None:
+    asked = query(goal_ne_m=(20.0, 0.0))
+    offered = proposal("detour", action(0.25, 0.0, 1.0), asked, P)
+    ends = np.array([path[-1] for path in offered.others_ne_m])
+    assert np.arctan2(ends[:, 1], ends[:, 0])[:4] == pytest.approx([0.85, 0.55, 1.0, 0.4])
+    assert np.hypot(*ends.T) == pytest.approx([P.long_m] * 8 + [0.6 * P.long_m] * 17)
+    image = proposal("detour", mirror_action("detour", action(0.25, 0.0, 1.0)), mirrored(asked), P)
+    assert all(
+        there == pytest.approx(here * EAST) for here, there in zip(offered.others_ne_m, image.others_ne_m, strict=True)
+    )
+    assert proposal("detour", action(0.25), asked, DecoderParams(aside_rad=0.0)).others_ne_m == ()
 
 
 def test_a_path_does_not_lead_past_the_goal_and_ends_there_if_near() -> None:
@@ -142,7 +179,7 @@ def test_a_ranking_gives_the_best_path_and_the_next_thirteen(seed: int) -> None:
     order = np.argsort(-logits)
     assert abs(best - ways[order[0]]) <= (ways[1] - ways[0]) / 2 + 1e-9
     assert len(offered.others_ne_m) == headings.NEXT_CHOICES
-    assert all(path.shape == (6, 2) for path in (offered.waypoints_ne_m, *offered.others_ne_m))
+    assert all(np.isfinite(path).all() for path in (offered.waypoints_ne_m, *offered.others_ne_m))
     towards = offered.others_ne_m[-headings.NEXT_HEADINGS][-1] - asked.prefix_ne_m[-1]
     goal = math.atan2(-0.1, 19.3)
     assert math.remainder(math.atan2(towards[1], towards[0]) - goal - ways[order[1]], math.tau) == pytest.approx(0.0)

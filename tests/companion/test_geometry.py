@@ -184,3 +184,10 @@ def test_the_end_of_a_polyline_is_found_whatever_rounding_makes_of_its_length() 
     end_s = geometry.length(path)
     for past in (0.0, 1e-9, 1.0):
         assert geometry.project(path, path[-1], end_s + past, end_s + past).distance_m < 1e-9
+
+
+def test_a_polyline_is_made_longer_along_its_last_piece() -> None:
+    path = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]])
+    assert geometry.extended(path, 1.5) == pytest.approx(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 3.5]]))
+    assert geometry.extended(path, 0.0) is path
+    assert geometry.extended(path[:1], 1.0) == pytest.approx(path[:1])

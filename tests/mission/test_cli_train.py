@@ -101,7 +101,7 @@ def test_an_evaluation_prints_one_object_and_needs_no_torch(desk: Path) -> None:
     assert set(EVALUATED) <= set(figures)
     assert figures["success"] == 1.0
     assert 1.0 <= figures["path_ratio"] < 1.2
-    assert sum(figures[kind] for kind in ("kept", "modified", "escape", "refused")) == pytest.approx(1.0)
+    assert sum(figures[kind] for kind in ("kept", "next", "modified", "escape", "refused")) == pytest.approx(1.0)
 
 
 @pytest.mark.slow

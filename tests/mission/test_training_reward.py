@@ -243,6 +243,14 @@ def test_tables_are_chosen_by_name_and_variants_by_the_world() -> None:
     assert reward_table("paper", "trajectory1").name == "trajectory1_paper"
     assert reward_table("default", "trajectory1_movers").name == "trajectory1"
     assert reward_table("default", "forest_3").name == "trajectory2"
-    assert set(TABLES) == {"trajectory1", "trajectory2", "trajectory1_paper", "trajectory2_paper", "plain"}
+    assert set(TABLES) == {"trajectory1", "trajectory2", "trajectory1_paper", "trajectory2_paper", "plain", "way"}
     with pytest.raises(InputError, match=r"unknown reward table 'papper'.*'paper'"):
         reward_table("papper")
+
+
+def test_seconds_saved_of_the_way_that_is_left_are_paid() -> None:
+    table = RewardTable("t", way=0.5)
+    state = reward.start(replace(HERE, way_s=20.0))
+    state, rows = reward.step(state, replace(HERE, t_s=1.0, way_s=17.0), table)
+    assert rows == {"way": 1.5}
+    assert reward.step(state, replace(HERE, t_s=2.0, way_s=18.0), table)[1] == {"way": -0.5}
