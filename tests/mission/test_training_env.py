@@ -210,6 +210,23 @@ def test_without_the_checker_a_path_through_a_tree_is_flown_and_the_stop_rule_al
     assert not bare["contact"] and bare["timeout"]
 
 
+def test_a_path_that_will_be_replaced_is_flown_through_its_end_without_braking() -> None:
+    avenue = lane(*((float(north), side) for north in range(2, 30, 3) for side in (-2.2, 2.2)), goal_m=32.0)
+
+    def slowest_m_s(run_out_m: float) -> float:
+        env = SwiftNavEnv(avenue, replace(CALM, params={"policy": {"learned_run_out_m": run_out_m}}))
+        env.reset(seed=0)
+        speeds = []
+        while True:
+            _, _, terminated, truncated, info = env.step(ZERO)
+            if terminated or truncated:
+                assert info["episode"]["success"]
+                return min(speeds[2:])
+            speeds.append(math.hypot(*env.query.state.vel_ned_m_s[:2].tolist()))
+
+    assert slowest_m_s(0.0) < 2.75 < 2.9 < slowest_m_s(4.0)
+
+
 def test_the_guard_is_off_unless_asked_for() -> None:
     assert not navigator_params(EnvConfig()).policy.guard
     assert navigator_params(EnvConfig(guard=True)).policy.guard
