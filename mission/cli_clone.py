@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mission.cli_options import Json, print_json, require_extra
-from mission.errors import InputError
+from mission.cli_options import Json, print_json, refuse_beside_resume, require_extra
 
 if TYPE_CHECKING:
     from mission.training.dagger import Standing
@@ -25,6 +24,7 @@ DEFAULT_WORLD = "mixed:train"
 
 
 def clone(
+    context: typer.Context,
     world: World = None,
     observation: Observation = "map",
     rounds: Rounds = 5,
@@ -42,8 +42,7 @@ def clone(
     from mission.training.training_worlds import world_source
 
     if resume is not None:
-        if world is not None or out is not None:
-            raise InputError("--resume goes on with a run as it was begun: no --world or --out beside it")
+        refuse_beside_resume(context, "json")
         folder, config = resume, read_config(resume)
     else:
         config = DaggerConfig(

@@ -53,6 +53,15 @@ def require_extra(extra: str, command: str) -> None:
         raise InputError(f"swiftnav {command} needs the '{extra}' extra: pip install 'swiftnav[{extra}]'")
 
 
+def refuse_beside_resume(context: typer.Context, *allowed: str) -> None:
+    """A run that goes on keeps its settings. Raises InputError naming the option that was given beside ``--resume``."""
+    for name in context.params:
+        source = context.get_parameter_source(name)
+        if name not in ("resume", *allowed) and source is not None and source.name == "COMMANDLINE":
+            option = {"setting": "set"}.get(name, name.replace("_", "-"))
+            raise InputError(f"--resume goes on with a run as it was begun: no --{option} beside it")
+
+
 def parse_switch(text: str, option: str) -> bool:
     """On or off. Raises InputError."""
     if text not in SWITCH:

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from mission.cli_options import Json, parse_overrides, print_json, require_extra
-from mission.errors import FlightError, InputError
+from mission.cli_options import Json, parse_overrides, print_json, refuse_beside_resume, require_extra
+from mission.errors import FlightError
 
 World = Annotated[str | None, typer.Option(help="A mission's world, a world file, or KIND[:SPLIT[:COUNT]].")]
 PresetName = Annotated[str, typer.Option("--preset", help="A name, or a YAML file.")]
@@ -38,6 +38,7 @@ COLUMNS = (
 
 
 def train(
+    context: typer.Context,
     world: World = None,
     preset: PresetName = "default",
     seeds: Seeds = 5,
@@ -65,8 +66,7 @@ def train(
     from mission.training.until import Until
 
     if resume is not None:
-        if world is not None or out is not None or setting:
-            raise InputError("--resume goes on with a run as it was begun: no --world, --set or --out beside it")
+        refuse_beside_resume(context, "jobs", "cluster", "json")
         folder, spec = resume, open_run(resume)
     else:
         chosen = load_preset(preset, parse_overrides(None, setting, "--set", "SECTION.FIELD=VALUE"))
