@@ -8,14 +8,13 @@ import numpy as np
 
 from companion.core import geometry
 from companion.core.types import F64
-from companion.policy.decoder import DecoderParams, arc, beyond_anchor, joined
+from companion.policy.decoder import SHORT, DecoderParams, arc, beyond_anchor, joined
 from companion.policy.goal_frame import goal_frame
 from companion.policy.interface import Proposal, Query
 
 HEADINGS = 41
 NEXT_HEADINGS = 13  # behind the best
 ASIDE = (0.0, 1.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0, -2.0 / 3.0)  # of the step between headings: gaps are narrower than it
-SHORT = 0.6  # of a path's length: as far as the gap's mouth, where the whole path does not fit through yet
 NEXT_CHOICES = 2 * len(ASIDE) - 1 + NEXT_HEADINGS
 LASTS_S = 0.8  # a straight path is replaced after this long: at 0.4 s flights were as long, at 3 s a tenth longer
 SHORTEST_M = 1.0  # chord of a teacher's path that its heading is read from, at least
