@@ -79,6 +79,7 @@ def test_ctrl_c_leaves_a_vehicle_that_holds_and_closed_logs(
     tmp_path: Path, instance: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(runner, "Children", Recorded)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job is born deaf to it
     with pytest.raises(KeyboardInterrupt):
         fly(plan_flight("trajectory1", seed=2), tmp_path, instance, lambda: os.kill(os.getpid(), signal.SIGINT))
     assert {child.exit_code for child in Recorded.started.values()} == {0, 130}
