@@ -1,8 +1,8 @@
 """How long would the rest of the way take from here, for somebody who knows the world? For rewards only; world ned.
 
 Seconds to the goal for a vehicle that is slower beside obstacles, as the navigator is. The drop of this time is a
-reward that leaves the best policy what it was (Ng 1999, potential-based shaping) and tells at once which side of a
-barrier was the right one. A policy that flies never sees it.
+reward that tells at once which side of a barrier was the right one. It is shaping in the manner of Ng 1999, but without
+his discount, so it may favour early drops a little. A policy that flies never sees it.
 """
 
 import math
