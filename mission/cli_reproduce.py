@@ -88,18 +88,25 @@ def _train(folder: Path, table: Any, chosen: "Sequence[Arm]", count: int, jobs: 
 
 def _list(chosen: "Sequence[Arm]", json: bool) -> None:
     if json:
-        names = ("name", "run", "group", "text", "world", "settings", "ticks_of")
-        rows = [{**{name: getattr(arm, name) for name in names}, "preset": arm.preset.name} for arm in chosen]
+        names = ("name", "run", "group", "text", "world", "settings", "ticks_of", "seeds")
+        rows = [
+            {**{name: getattr(arm, name) for name in names}, "preset": arm.preset.name, "episodes": arm.until.episodes}
+            for arm in chosen
+        ]
         print_json({"arms": rows})
         return
     from rich.console import Console
     from rich.table import Table
 
     shown = Table()
-    for name in ("group", "arm", "world", "preset", "what"):
-        shown.add_column(name)
+    for name in ("group", "arm", "world", "preset", "seeds", "episodes", "what"):
+        shown.add_column(name, no_wrap=name in ("arm", "world"))
     for arm in chosen:
-        shown.add_row(arm.group, arm.name, arm.world, arm.preset.name, arm.text)
+        seeds, episodes = (
+            str(arm.seeds or "all"),
+            f"ticks of {arm.ticks_of}" if arm.ticks_of else str(arm.until.episodes),
+        )
+        shown.add_row(arm.group, arm.name, arm.world, arm.preset.name, seeds, episodes, arm.text)
     Console(highlight=False, emoji=False).print(shown)
 
 
@@ -109,10 +116,10 @@ def _print(found: "Findings", documents: Sequence[Path]) -> None:
 
     console = Console(highlight=False, emoji=False)
     shown = Table()
-    for name in ("paper claim", "settings", "measured here", "holds?"):
+    for name in ("paper claim", "settings", "measured here", "seeds", "holds?"):
         shown.add_column(name)
     for outcome in found.outcomes:
-        shown.add_row(outcome.claim.text, outcome.settings, outcome.measured, str(outcome.verdict))
+        shown.add_row(outcome.claim.text, outcome.settings, outcome.measured, outcome.seeds, str(outcome.verdict))
     console.print(shown)
     console.print(", ".join(f"{count} {name}" for name, count in found.counts().items()), markup=False)
     for path in documents:

@@ -23,7 +23,8 @@ GROUPS = ("paper", "replay", "epsilon", "checker", "sensing", "worlds")
 QUICK_ARMS = ("t1", "t2", "vanilla", "no_stability", "no_checker")
 QUICK_UNTIL = {"successes": 3, "episodes": 3}
 QUICK_FLIGHTS = 2
-QUICK_SETTINGS = {"training.evaluate_every": 0, "training.warmup_decisions": 8, "env.time_limit_s": 40.0}
+EVALUATE = "training.evaluate_every"
+QUICK_SETTINGS = {EVALUATE: 0, "training.warmup_decisions": 8, "env.time_limit_s": 40.0}
 
 
 class UntilSpec(StrictModel):
@@ -33,7 +34,15 @@ class UntilSpec(StrictModel):
     episodes: int
 
 
-class ArmSpec(StrictModel):
+class GroupSpec(StrictModel):
+    """What is usual in a group; an arm may say otherwise."""
+
+    until: UntilSpec | None = None
+    seeds: int | None = Field(default=None, ge=1)  # at most; None: as many as are asked for
+    checkpoints: bool | None = None
+
+
+class ArmSpec(GroupSpec):
     """One arm as the table has it."""
 
     group: str
@@ -41,7 +50,6 @@ class ArmSpec(StrictModel):
     world: str
     preset: str | None = None
     settings: dict[str, Any] = Field(default_factory=dict)
-    until: UntilSpec | None = None
     ticks_of: str | None = None
 
 
@@ -50,13 +58,18 @@ class TableSpec(StrictModel):
 
     until: UntilSpec
     presets: dict[str, str] = Field(default_factory=dict)  # by world, of arms that name none
+    groups: dict[str, GroupSpec] = Field(default_factory=dict)
     flights: int
     arms: dict[str, ArmSpec]
 
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """One arm. ``run``: the arm whose folder it trains in; ``ticks_of``: the arm whose ticks are its budget."""
+    """One arm. ``run``: the arm whose folder it trains in; ``ticks_of``: the arm whose ticks are its budget.
+
+    ``seeds``: at most so many, however many are asked for. An arm without ``checkpoints`` flies greedily at its end
+    alone; what it learns is the same.
+    """
 
     name: str
     run: str
@@ -67,6 +80,11 @@ class Arm:
     settings: Mapping[str, Any]
     until: Until
     ticks_of: str | None
+    seeds: int | None
+
+    def seeds_of(self, asked: Sequence[int]) -> tuple[int, ...]:
+        """Which of the seeds asked for it trains: the first."""
+        return tuple(sorted(asked)[: self.seeds])
 
     def spec(self, seeds: Sequence[int]) -> RunSpec:
         """What is trained, but for a budget of ticks."""
@@ -117,10 +135,10 @@ def load_table(path: Path | None = None, quick: bool = False) -> Table:
 def _table(data: dict[str, Any], where: str, quick: bool) -> Table:
     spec = checked(TableSpec, data, where)
     arms: list[Arm] = []
+    for group in spec.groups:
+        _check_group(group, f"{where}: groups")
     for name, row in spec.arms.items():
-        usual = row.until or spec.until
-        preset = row.preset or spec.presets.get(row.world, "default")
-        arm = _arm(name, row.model_copy(update={"until": usual, "preset": preset}), where, quick)
+        arm = _arm(name, _filled(row, spec), where, quick)
         if arm.ticks_of is not None and arm.ticks_of not in [earlier.name for earlier in arms]:
             raise InputError(f"{where}: arm '{name}': ticks_of '{arm.ticks_of}' is no arm before it")
         twin = next((earlier.run for earlier in arms if _same(earlier, arm)), name)
@@ -128,20 +146,38 @@ def _table(data: dict[str, Any], where: str, quick: bool) -> Table:
     return Table(tuple(arms), QUICK_FLIGHTS if quick else spec.flights, quick)
 
 
+def _filled(row: ArmSpec, table: TableSpec) -> ArmSpec:
+    """With what its group and the table say where the row says nothing."""
+    group = table.groups.get(row.group, GroupSpec())
+    return row.model_copy(
+        update={
+            "until": row.until or group.until or table.until,
+            "preset": row.preset or table.presets.get(row.world, "default"),
+            "seeds": row.seeds or group.seeds,
+            "checkpoints": group.checkpoints if row.checkpoints is None else row.checkpoints,
+        }
+    )
+
+
+def _check_group(name: str, where: str) -> None:
+    if name not in GROUPS:
+        raise InputError(f"{where}: unknown group '{name}'{nearest(name, list(GROUPS))}")
+
+
 def _arm(name: str, row: ArmSpec, where: str, quick: bool) -> Arm:
-    """From a row that names preset and end."""
+    """From a row that was filled."""
     assert row.preset is not None
     assert row.until is not None
     told = f"{where}: arm '{name}'"
-    if row.group not in GROUPS:
-        raise InputError(f"{told}: unknown group '{row.group}'{nearest(row.group, list(GROUPS))}")
-    settings = {**row.settings, **(QUICK_SETTINGS if quick else {})}
+    _check_group(row.group, told)
+    unwatched = {EVALUATE: 0} if row.checkpoints is False else {}
+    settings = {**row.settings, **unwatched, **(QUICK_SETTINGS if quick else {})}
     try:
         preset = load_preset(row.preset, _nested(settings))
         until = Until(**(QUICK_UNTIL if quick else row.until.model_dump()))
     except (InputError, ValueError) as error:
         raise InputError(f"{told}: {error}") from error
-    return Arm(name, name, row.group, row.text, row.world, preset, row.settings, until, row.ticks_of)
+    return Arm(name, name, row.group, row.text, row.world, preset, row.settings, until, row.ticks_of, row.seeds)
 
 
 def _nested(settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

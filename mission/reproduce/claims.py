@@ -1,7 +1,8 @@
 """Does a claim of the paper hold here?  A stated rule on figures of arms, seed by seed; pure.
 
 A claim about a curve holds where at least four seeds in five agree (``AGREED``); one that sets two arms against each
-other compares their means over seeds. ``not run``: an arm of it has no finished seed, or trained too few episodes.
+other compares their means over seeds. ``not measured``: an arm of it has no finished seed, trained too few episodes, or
+has one seed where the rule wants an interval.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +21,7 @@ class Verdict(StrEnum):
 
     HOLDS = "holds"
     FAILS = "does not hold here"
-    NOT_RUN = "not run"
+    NOT_MEASURED = "not measured"
 
 
 class UnmeasuredError(Exception):
@@ -46,6 +47,7 @@ class Outcome:
     claim: Claim
     settings: str
     measured: str
+    seeds: str  # how many of which arm
     verdict: Verdict
 
 
@@ -87,13 +89,13 @@ def told(seeds: Seeds, name: str, digits: int = 2) -> str:
 
 
 def _judge(claim: Claim, settings: str, names: tuple[str, ...], arms: Mapping[str, Seeds]) -> Outcome:
-    missing = [name for name in names if not arms.get(name)]
+    counts = {name: len(arms.get(name, ())) for name in names}
+    seeds = ", ".join(f"{name} {count}" for name, count in counts.items())
+    missing = [name for name in names if not counts[name]]
     if missing:
-        return Outcome(claim, settings, f"no finished seed of {', '.join(missing)}", Verdict.NOT_RUN)
+        return Outcome(claim, settings, f"no finished seed of {', '.join(missing)}", seeds, Verdict.NOT_MEASURED)
     try:
         holds, measured = claim.judge(*(arms[name] for name in names))
     except UnmeasuredError as figure:
-        return Outcome(claim, settings, f"too little was flown to tell {figure}", Verdict.NOT_RUN)
-    counts = ", ".join(str(count) for count in dict.fromkeys(len(arms[name]) for name in names))
-    seeds = f"{counts} seed{'' if counts == '1' else 's'}"
-    return Outcome(claim, settings, f"{measured} ({seeds})", Verdict.HOLDS if holds else Verdict.FAILS)
+        return Outcome(claim, settings, f"too little was flown to tell {figure}", seeds, Verdict.NOT_MEASURED)
+    return Outcome(claim, settings, measured, seeds, Verdict.HOLDS if holds else Verdict.FAILS)

@@ -63,7 +63,8 @@ def findings(out: Path, table: Table) -> Findings:
     outcomes = judge_all(CLAIMS, {name: found.figures for name, found in arms.items()})
     if table.quick:
         outcomes = [
-            replace(outcome, measured=QUICK.format(outcome.measured), verdict=Verdict.NOT_RUN) for outcome in outcomes
+            replace(outcome, measured=QUICK.format(outcome.measured), verdict=Verdict.NOT_MEASURED)
+            for outcome in outcomes
         ]
     return Findings(table.quick, arms, outcomes)
 
@@ -106,5 +107,6 @@ def _outcome_dict(outcome: Outcome) -> dict[str, Any]:
         "claim": claim.text,
         "rule": claim.rule,
         "measured": outcome.measured,
+        "seeds": outcome.seeds,
         "verdict": str(outcome.verdict),
     }

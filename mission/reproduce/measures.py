@@ -27,6 +27,7 @@ from mission.training.until import Until
 Row = dict[str, Any]
 Figures = dict[str, float | None]
 SETTLED = 50  # episodes, "a few dozen": from here on a tight band is a tight band
+FIRST_SHARE = 100  # episodes, which every seed that got its 100 successes has had
 LAST_SHARE = 50  # episodes over which late success is counted
 LEAST_GAIN_M = 1.0  # a track that gained less counts as this: going nowhere is a long detour, not an endless one
 CONFIDENCE = 0.95
@@ -88,6 +89,7 @@ def figures_of(rows: SeedRows, until: Until, goal_ne_m: F64 | None) -> Figures:
         "successes": sum(wins),
         "reached": float(sum(wins) >= until.successes),
         "ticks": float(sum(row["ticks"] for row in episodes)),
+        "successes_first100": sum(wins[:FIRST_SHARE]) if len(wins) >= FIRST_SHARE else None,
         "success_last50": _mean(wins[-LAST_SHARE:]),
         "contact": _mean([float(row["contact"]) for row in episodes]),
         "switches": _mean([row["switches"] for row in episodes]),

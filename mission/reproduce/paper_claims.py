@@ -169,7 +169,7 @@ CLAIMS = (
         "both_essential",
         ABLATIONS,
         "stability logic and checker are both essential",
-        "without either: 10 points less success in the last 50 episodes, or a fifth more episodes to the end",
+        "without either: 10 points less success in the last 50 episodes, or a fifth fewer successes in the first 100",
         {"default": ("no_stability", "no_checker", "t2")},
         rules.essential,
     ),

@@ -77,13 +77,13 @@ def prepare(out: Path, arms: Sequence[Arm], seeds: Sequence[int]) -> None:
     """``run.yaml`` of every arm. Raises InputError where an arm was begun with other settings."""
     for arm in arms:
         folder = arm_folder(out, arm)
-        wanted = replace(arm.spec(seeds), preset=replace(arm.preset, name=arm.run, text=arm.text))
+        wanted = replace(arm.spec(arm.seeds_of(seeds)), preset=replace(arm.preset, name=arm.run, text=arm.text))
         if (folder / RUN_FILE).is_file():
             begun = open_run(folder)
             difference = _difference(begun, wanted)
             if difference:
                 raise InputError(f"{folder} was begun with {difference}: go on with another --out")
-            wanted = replace(begun, seeds=tuple(sorted({*begun.seeds, *seeds})))
+            wanted = replace(begun, seeds=tuple(sorted({*begun.seeds, *wanted.seeds})))
         try:
             folder.mkdir(parents=True, exist_ok=True)
             temporary = folder / f".{RUN_FILE}"
@@ -105,7 +105,7 @@ def run_all(
             continue
         found = tasks_of(out, table, arm, seeds)
         budgeted += found
-        left = sorted({*seeds} - {task.seed for task in found})
+        left = sorted({*arm.seeds_of(seeds)} - {task.seed for task in found})
         troubles += [f"{arm.name} seed {seed}: waits for {arm.ticks_of}" for seed in left]
     return troubles + _run(budgeted, out, jobs, on_update)
 
@@ -113,8 +113,9 @@ def run_all(
 def tasks_of(out: Path, table: Table, arm: Arm, seeds: Sequence[int]) -> list[Task]:
     """The seeds of an arm; of one with a budget those whose budget is known."""
     tasks: list[Task] = []
-    for seed in seeds:
-        spec = arm.spec(sorted(seeds))
+    own = arm.seeds_of(seeds)
+    for seed in own:
+        spec = arm.spec(own)
         if arm.ticks_of is not None:
             ticks = _ticks(seed_folder(arm_folder(out, table.arm(arm.ticks_of)), seed))
             if ticks is None:

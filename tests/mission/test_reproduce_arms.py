@@ -1,5 +1,6 @@
 """The table of arms fits the presets, says what differs, and refuses what it does not know."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from mission.errors import InputError
 from mission.reproduce.arms import GROUPS, QUICK_ARMS, load_table
 from mission.reproduce.run import check
+from mission.training.low_level import HOLD_TICKS
 from mission.training.presets import load_preset
 
 MINE = """
@@ -51,7 +53,38 @@ def test_an_arm_differs_from_its_preset_by_what_it_says_and_by_nothing_else() ->
         for key, value in arm.settings.items():
             section, _, field = key.partition(".")
             nested.setdefault(section, {})[field] = value
-        assert arm.preset == load_preset(arm.preset.name, nested)
+        training = load_preset(arm.preset.name, nested).training
+        assert arm.preset.training in (training, replace(training, evaluate_every=0))  # what is watched decides nothing
+        assert replace(arm.preset, training=training) == load_preset(arm.preset.name, nested)
+
+
+def test_an_arm_takes_from_its_group_what_it_does_not_say_itself(tmp_path: Path) -> None:
+    path = tmp_path / "arms.yaml"
+    path.write_text(
+        "until: {successes: 10, episodes: 20}\nflights: 2\n"
+        "groups: {replay: {seeds: 3, checkpoints: false, until: {successes: 10, episodes: 5}}}\narms:\n"
+        "  plain: {group: paper, text: a, world: trajectory1}\n"
+        "  usual: {group: replay, text: b, world: trajectory1}\n"
+        "  own: {group: replay, text: c, world: trajectory1, seeds: 1, checkpoints: true, "
+        "until: {successes: 10, episodes: 7}}\n"
+    )
+    plain, usual, own = load_table(path).arms
+    assert [arm.until.episodes for arm in (plain, usual, own)] == [20, 5, 7]
+    assert [arm.seeds_of((2, 1, 4, 3)) for arm in (plain, usual, own)] == [(1, 2, 3, 4), (1, 2, 3), (1,)]
+    assert usual.preset.training.evaluate_every == 0
+    assert plain.preset == own.preset
+    path.write_text(path.read_text().replace("groups: {replay", "groups: {repley"))
+    with pytest.raises(InputError, match="unknown group 'repley'; did you mean 'replay'"):
+        load_table(path)
+
+
+def test_the_baseline_learns_no_less_often_a_tick_than_the_arm_whose_ticks_it_gets() -> None:
+    table = load_table()
+    for name in ("vanilla", "vanilla_paper"):
+        baseline = table.arm(name).preset.training.updates_per_decision
+        assert table.arm(name).ticks_of is not None
+        swift = table.arm(table.arm(name).ticks_of or "").preset.training.updates_per_decision
+        assert baseline / HOLD_TICKS > swift / 38  # ticks a decision, as trained
 
 
 @pytest.mark.parametrize(("other", "expected"), BAD)

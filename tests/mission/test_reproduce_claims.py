@@ -31,7 +31,7 @@ def test_a_claim_whose_arm_was_not_run_is_not_judged(claim: Claim) -> None:
         for missing in arms:
             rest = {name: seeds for name, seeds in AS_TOLD.items() if name != missing}
             outcome = next(o for o in judge_all([claim], rest) if o.settings == settings)
-            assert outcome.verdict is Verdict.NOT_RUN
+            assert outcome.verdict is Verdict.NOT_MEASURED
             assert missing in outcome.measured
 
 
@@ -39,7 +39,16 @@ def test_a_claim_whose_arm_was_not_run_is_not_judged(claim: Claim) -> None:
 def test_a_claim_is_not_judged_by_figures_that_are_missing(claim: Claim) -> None:
     nothing: Figures = dict.fromkeys(SWIFT)
     outcomes = judge_all([claim], {name: [nothing] for name in AS_TOLD})
-    assert {outcome.verdict for outcome in outcomes} == {Verdict.NOT_RUN}
+    assert {outcome.verdict for outcome in outcomes} == {Verdict.NOT_MEASURED}
+
+
+def test_one_seed_has_no_interval_to_lie_apart() -> None:
+    alone = {name: seeds[:1] for name, seeds in AS_TOLD.items()}
+    claim = next(claim for claim in CLAIMS if claim.name == "per_quicker")
+    outcome = judge_all([claim], alone)[0]
+    assert outcome.verdict is Verdict.NOT_MEASURED
+    assert outcome.measured == "too little was flown to tell the interval of episodes over seeds"
+    assert outcome.seeds == "replay_per 1, replay_uniform 1"
 
 
 def test_every_claim_has_a_place_a_rule_and_arms_of_the_table() -> None:

@@ -94,6 +94,12 @@ def test_what_is_done_is_not_done_again(tmp_path: Path, fleet: Fleet) -> None:
     assert open_run(tmp_path / "arms" / "t1").seeds == (1, 2, 3), "fewer seeds forget none"
 
 
+def test_an_arm_of_fewer_seeds_trains_its_first_ones(tmp_path: Path, fleet: Fleet) -> None:
+    _run(tmp_path, "epsilon_none", 5)
+    assert [(arm, seed) for arm, seed, _ in fleet.trained] == [("epsilon_none", seed) for seed in (1, 2, 3)]
+    assert open_run(tmp_path / "arms" / "epsilon_none").seeds == (1, 2, 3)
+
+
 def test_arms_that_share_a_training_train_once(tmp_path: Path, fleet: Fleet) -> None:
     _run(tmp_path, "t2,replay_per", 1)
     assert [(arm, seed) for arm, seed, _ in fleet.trained] == [("t2", 1)]
@@ -173,7 +179,7 @@ def test_a_quick_run_gives_no_verdict(tmp_path: Path) -> None:
     for name in ("t1", "t2"):
         write_arm(tmp_path, table, name, 1, 3)
     found = findings(tmp_path, table)
-    assert found.counts() == {"holds": 0, "does not hold here": 0, "not run": len(found.outcomes)}
+    assert found.counts() == {"holds": 0, "does not hold here": 0, "not measured": len(found.outcomes)}
     assert "A quick run" in text_of(found, [], "swiftnav reproduce --quick")
 
 
