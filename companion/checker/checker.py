@@ -6,6 +6,7 @@ the wall. Depends on nothing learned.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -42,7 +43,7 @@ class CheckQuery:
     points_ned_m: F64  # (n, 2) everything remembered
     proposal_ned_m: F64 | None  # (k, 2) waypoints; None: the policy has none
     escape_ned_m: F64 | None  # (k, 2) waypoints of a way out, tried only if the proposal cannot be saved
-    others_ned_m: tuple[F64, ...] = ()  # next choices of the policy, each (k, 2), best first
+    others_ned_m: Sequence[F64] = ()  # next choices of the policy, each (k, 2), best first
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,9 @@ Both begin where the committed stretch ends. Mirrored query and mirrored action 
 """
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +72,24 @@ def proposal(name: str, action: F64, query: Query, params: DecoderParams) -> Pro
     step_rad = math.copysign(params.aside_rad, side_rad)
     nexts = [(side_rad + steps * step_rad, length_m) for steps in ASIDES]
     nexts += [(side_rad + steps * step_rad, SHORT * length_m) for steps in SHORT_ASIDES]
-    return Proposal(first, tuple(joined(query, arc(aside, turn_rad, way_m, query, params)) for aside, way_m in nexts))
+    return Proposal(
+        first, _Choices(nexts, lambda aside, way_m: joined(query, arc(aside, turn_rad, way_m, query, params)))
+    )
+
+
+class _Choices(Sequence[F64]):
+    """Next choices, each decoded when it is asked for: mostly the first is kept, and all of them cost a tick's time."""
+
+    def __init__(self, ways: list[tuple[float, float]], decoded: Callable[[float, float], F64]) -> None:
+        self._ways, self._decoded = ways, decoded
+
+    def __len__(self) -> int:
+        return len(self._ways)
+
+    def __getitem__(self, choice: int | slice) -> Any:
+        if isinstance(choice, slice):
+            return [self._decoded(*way) for way in self._ways[choice]]
+        return self._decoded(*self._ways[choice])
 
 
 def joined(query: Query, waypoints_ne_m: F64) -> F64:

@@ -1,5 +1,6 @@
 """What is a policy asked, and what does it answer? Values; the same for the learned policy and the geometric expert."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -33,7 +34,7 @@ class Proposal:
     """
 
     waypoints_ne_m: F64
-    others_ne_m: tuple[F64, ...] = ()
+    others_ne_m: Sequence[F64] = ()
     lasts_s: float | None = None
 
 
