@@ -6,7 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from mission.cli_options import Json, ParamSet, parse_overrides, print_json, require_extra
+from mission.cli_options import Json, ParamSet, parse_overrides, parse_switch, print_json, require_extra
+from mission.cluster import check_address
 
 OUT = Path("bench")
 DEFAULT = "geometric"
@@ -24,7 +25,9 @@ Part = Annotated[str, typer.Option("--part", help="Of BARN's worlds: all, tuning
 PilotName = Annotated[str, typer.Option("--pilot", help="Who flies; 'all': every pilot in turn.")]
 Runs = Annotated[int | None, typer.Option("--runs", min=1, help="Of each cell; default: the suite's own number.")]
 Jobs = Annotated[int, typer.Option("--jobs", min=1, max=256, help="Processes.")]
+Cluster = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Fly on this Ray cluster; 'local': a Ray here.")]
 StressName = Annotated[str, typer.Option("--stress", help="noise, dropouts, latency, gusts, drift, blind; or none.")]
+Guard = Annotated[str, typer.Option("--guard", help="off: a learned policy flies without the expert beside it.")]
 Profile = Annotated[str | None, typer.Option("--profile", help="A named parameter set of the companion.")]
 Out = Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Runs that lie there are not flown again.")]
 Stiff = Annotated[bool, typer.Option("--stiff", help="A vehicle with a stiff velocity loop instead of PX4's gains.")]
@@ -37,7 +40,9 @@ class Asked:
     pilot: str
     runs: int | None
     jobs: int
+    cluster: str | None
     stress: str
+    guard: str
     profile: str | None
     param: list[str] | None
     stiff: bool
@@ -61,14 +66,16 @@ def _command(name: str) -> Any:
         pilot: PilotName = DEFAULT,
         runs: Runs = None,
         jobs: Jobs = 1,
+        cluster: Cluster = None,
         stress: StressName = "none",
+        guard: Guard = "on",
         profile: Profile = None,
         param: ParamSet = None,
         stiff: Stiff = False,
         out: Out = OUT,
         json: Json = False,
     ) -> None:
-        _fly(name, None, "all", Asked(pilot, runs, jobs, stress, profile, param, stiff, out, json))
+        _fly(name, None, "all", Asked(pilot, runs, jobs, cluster, stress, guard, profile, param, stiff, out, json))
 
     return fly
 
@@ -79,7 +86,9 @@ def barn(
     pilot: PilotName = DEFAULT,
     runs: Runs = None,
     jobs: Jobs = 1,
+    cluster: Cluster = None,
     stress: StressName = "none",
+    guard: Guard = "on",
     profile: Profile = None,
     param: ParamSet = None,
     stiff: Stiff = False,
@@ -87,7 +96,7 @@ def barn(
     json: Json = False,
 ) -> None:
     """BARN's worlds, one to one, by BARN's formula."""
-    _fly("barn", worlds, part, Asked(pilot, runs, jobs, stress, profile, param, stiff, out, json))
+    _fly("barn", worlds, part, Asked(pilot, runs, jobs, cluster, stress, guard, profile, param, stiff, out, json))
 
 
 def all_suites(
@@ -96,6 +105,8 @@ def all_suites(
     pilot: PilotName = "all",
     runs: Runs = None,
     jobs: Jobs = 1,
+    cluster: Cluster = None,
+    guard: Guard = "on",
     profile: Profile = None,
     param: ParamSet = None,
     stiff: Stiff = False,
@@ -110,7 +121,7 @@ def all_suites(
 
         SuiteSpec("barn", worlds, part).load()  # hours before its turn
     for name in names:
-        _fly(name, worlds, part, Asked(pilot, runs, jobs, "none", profile, param, stiff, out, json))
+        _fly(name, worlds, part, Asked(pilot, runs, jobs, cluster, "none", guard, profile, param, stiff, out, json))
 
 
 def report(
@@ -129,6 +140,9 @@ def report(
 def _fly(suite: str, worlds: Path | None, part: str, asked: Asked) -> None:
     """Fly what is missing of a suite, pilot by pilot, and say what came out."""
     require_extra("sitl", f"bench {suite}")
+    if asked.cluster is not None:
+        require_extra("scale", f"bench {suite} --cluster")
+        check_address(asked.cluster)
     from rich.console import Console
     from rich.progress import track
 
@@ -141,17 +155,17 @@ def _fly(suite: str, worlds: Path | None, part: str, asked: Asked) -> None:
 
     console = Console(stderr=asked.json, highlight=False)
     overrides = parse_overrides(None, asked.param)
-    stress = stress_named(asked.stress)
+    stress, guard = stress_named(asked.stress), parse_switch(asked.guard, "--guard")
     pilots = pilot_names() if asked.pilot == "all" else [pilot_named(asked.pilot).name]
     spec = SuiteSpec(suite, worlds, part)
     made = spec.load()
     for skipped in made.skipped:
         console.print(f"skipped {skipped.name}: {skipped.reason}", markup=False)
     for pilot in pilots:
-        entry = Entry(pilot, asked.profile, stress.name, overrides, dict(STIFF) if asked.stiff else {})
+        entry = Entry(pilot, asked.profile, stress.name, guard, overrides, dict(STIFF) if asked.stiff else {})
         entry.params_for(made.cells[0].course(0))  # a wrong parameter is refused before anything flies
         folder = entry_folder(asked.out, spec, entry)
-        flying = fly_missing(spec, made, entry, folder, asked.runs, asked.jobs)
+        flying = fly_missing(spec, made, entry, folder, asked.runs, asked.jobs, asked.cluster)
         total = len(missing(made, asked.runs, read_entry(folder)))
         for _ in track(flying, f"{suite} {folder.name}", total, console=console):
             pass

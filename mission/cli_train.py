@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from mission.cli_options import Json, parse_overrides, print_json, refuse_beside_resume, require_extra
+from mission.cluster import check_address
 from mission.errors import FlightError
 
 World = Annotated[str | None, typer.Option(help="A mission's world, a world file, or KIND[:SPLIT[:COUNT]].")]
@@ -57,6 +58,7 @@ def train(
     require_extra("train", "train")
     if cluster is not None:
         require_extra("scale", "train --cluster")
+        check_address(cluster)
     from mission.training.fleet import cores
     from mission.training.fleet_view import FleetView
     from mission.training.presets import load_preset

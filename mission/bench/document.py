@@ -99,6 +99,7 @@ def _command(entry: Flown) -> str:
     words += [f"--profile {setup['profile']}"] if setup["profile"] else []
     words += [f"--stress {setup['stress']}"] if setup["stress"] != "none" else []
     words += ["--stiff"] if setup["px4_params"] else []
+    words += [] if setup["guard"] else ["--guard", "off"]
     words += [f"--param {g}.{f}={json.dumps(v)}" for g, fields in setup["params"].items() for f, v in fields.items()]
     runs = 1 + max(row.run for row in entry.rows)
     return " ".join([*words, f"--runs {runs}"])

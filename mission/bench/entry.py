@@ -4,7 +4,6 @@ import math
 import zlib
 from dataclasses import dataclass, field
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from companion.core import params as core_params
 from companion.policy.store import digest_of, shipped
 from mission.bench.course import Course
 from mission.bench.flight import End, Flown, fly
-from mission.bench.pictures import draw_failure
+from mission.bench.pictures import failure_picture
 from mission.bench.rows import Row
 from mission.bench.stress import stress_named
 from mission.pilots.registry import pilot_named
@@ -32,9 +31,9 @@ class Entry:
     pilot: str = "geometric"
     profile: str | None = None  # None: the defaults
     stress: str = "none"
+    guard: bool = True  # off: a learned policy flies without the expert beside it
     overrides: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the companion's parameters
     px4_params: dict[str, float] = field(default_factory=dict)
-    pictures: Path | None = None  # where failures are drawn
 
     def settings(self) -> dict[str, Any]:
         """What must be the same for runs to be counted together."""
@@ -44,6 +43,7 @@ class Entry:
             "profile": self.profile,
             "stress": self.stress,
             "profile_params": profile_named(self.profile) if self.profile is not None else {},
+            "guard": self.guard,
             "params": self.overrides,
             "px4_params": self.px4_params,
         }
@@ -54,18 +54,26 @@ class Entry:
         if self.profile is not None:
             params = core_params.update(params, profile_named(self.profile))
         params = core_params.update(params, {"vehicle": {"radius_m": course.rules.radius_m}, **course.rules.params})
+        if not self.guard:
+            params = core_params.update(params, {"policy": {"guard": False}})
         return core_params.update(params, self.overrides)
 
 
-def fly_run(course: Course, run: int, entry: Entry, commit: str) -> Row:
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What one run leaves."""
+
+    row: Row
+    picture: bytes | None  # PNG, where it failed
+
+
+def fly_run(course: Course, run: int, entry: Entry, commit: str) -> Run:
     """One run, judged; a picture where it failed."""
     seed = run_seed(course.cell, run)
     params = entry.params_for(course)
     flown = fly(course, pilot_named(entry.pilot), params, seed, stress_named(entry.stress), entry.px4_params)
-    if entry.pictures is not None and flown.end is not End.GOAL:
-        entry.pictures.mkdir(parents=True, exist_ok=True)
-        draw_failure(course, flown, run, entry.pictures / f"{_file_name(course.cell)}_{run:04d}.png")
-    return row_of(course, run, seed, flown, commit)
+    picture = None if flown.end is End.GOAL else failure_picture(course, flown, run)
+    return Run(row_of(course, run, seed, flown, commit), picture)
 
 
 def run_seed(cell: str, run: int) -> int:
@@ -138,7 +146,3 @@ def _jerk(flown: Flown) -> float | None:
     acc = np.diff(flown.vel_ned_m_s, axis=0) / dt_s
     jerk = np.diff(acc, axis=0) / dt_s[1:]
     return float(np.mean(np.sum(jerk**2, axis=1)))
-
-
-def _file_name(cell: str) -> str:
-    return "".join(c if c.isalnum() or c in ".-" else "_" for c in cell)

@@ -1,6 +1,6 @@
 """What did a failed run look like? World, track by speed, last scan, last path, where it ended; one picture."""
 
-from pathlib import Path
+import io
 from typing import Any
 
 import numpy as np
@@ -19,8 +19,8 @@ SIDE_IN = 8.0
 ROUND_M = 3.0  # shown round the flight
 
 
-def draw_failure(course: Course, flown: Flown, run: int, path: Path) -> None:
-    """Write the picture."""
+def failure_picture(course: Course, flown: Flown, run: int) -> bytes:
+    """The picture as PNG."""
     figure = Figure(figsize=(SIDE_IN, SIDE_IN))
     ax = figure.add_axes((0.08, 0.07, 0.84, 0.84))
     draw_world(ax, course.world, 0.0 if not course.world.movers else float(flown.track[-1, 0]))
@@ -36,7 +36,9 @@ def draw_failure(course: Course, flown: Flown, run: int, path: Path) -> None:
     title = f"{course.name}, run {run}: {flown.end} after {flown.time_s:.1f} s, {flown.track[-1, 3]:.2f} m/s, {mode}"
     ax.set_title(title, fontsize=10)
     FigureCanvasAgg(figure)
-    figure.savefig(path, dpi=DPI, facecolor="white")
+    png = io.BytesIO()
+    figure.savefig(png, format="png", dpi=DPI, facecolor="white")
+    return png.getvalue()
 
 
 def _draw_track(figure: Figure, ax: Any, flown: Flown) -> None:

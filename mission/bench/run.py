@@ -4,7 +4,6 @@
 runs of other settings are never mixed in) and ``failures/``. Interrupt at any time: what is there is not flown again.
 """
 
-import dataclasses
 import json
 import os
 import platform
@@ -16,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from mission.bench import rows
-from mission.bench.entry import Entry, fly_run
+from mission.bench.entry import Entry, Run, fly_run
 from mission.bench.rows import Row
 from mission.bench.suites import Suite, suite_named
+from mission.cluster import on_cluster
 from mission.errors import InputError
 from mission.side_by_side import side_by_side
 
@@ -53,6 +53,7 @@ def entry_folder(out: Path, spec: SuiteSpec, entry: Entry) -> Path:
     parts += [entry.profile] if entry.profile is not None else []
     parts += [entry.stress] if entry.stress != "none" else []
     parts += ["stiff"] if entry.px4_params else []
+    parts += [] if entry.guard else ["alone"]
     return out / suite / "_".join(parts)
 
 
@@ -69,19 +70,29 @@ def missing(suite: Suite, runs: int | None, there: list[Row]) -> list[Job]:
 
 
 def fly_missing(
-    spec: SuiteSpec, suite: Suite, entry: Entry, folder: Path, runs: int | None = None, jobs: int = 1
+    spec: SuiteSpec,
+    suite: Suite,
+    entry: Entry,
+    folder: Path,
+    runs: int | None = None,
+    jobs: int = 1,
+    cluster: str | None = None,
 ) -> Iterator[Row]:
-    """Fly what is missing, append each row as it ends and hand it over. Raises InputError for other settings there."""
+    """Fly what is missing, append each row as it ends and hand it over.
+
+    Raises InputError for other settings there or a cluster that does not answer, FlightError where a process died.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _claim(folder / SETUP, spec, entry)
     except OSError as error:
         raise InputError(f"--out: {error.filename or folder}: {error.strerror}") from error
     todo = missing(suite, runs, rows.read(folder / RUNS))
-    entry = dataclasses.replace(entry, pictures=folder / FAILURES)
-    for row in _flown(suite, entry, todo, jobs):
-        rows.append(folder / RUNS, row)
-        yield row
+    for run in _flown(_Work(suite, entry, commit()), todo, jobs, cluster):
+        if run.picture is not None:
+            _keep_picture(folder / FAILURES, run)
+        rows.append(folder / RUNS, run.row)
+        yield run.row
 
 
 def read_entry(folder: Path) -> list[Row]:
@@ -148,32 +159,39 @@ def _setup(path: Path) -> dict[str, Any]:
     return there
 
 
-def _flown(suite: Suite, entry: Entry, todo: list[Job], jobs: int) -> Iterator[Row]:
-    state = commit()
-    if jobs == 1 or len(todo) <= 1:
-        for job in todo:
-            yield fly_run(suite.cells[job.cell].course(job.run), job.run, entry, state)
-        return
-    arguments = (suite, entry, state)
-    yield from side_by_side(_fly, todo, jobs, _set_up, arguments, in_order=False)
+def _keep_picture(folder: Path, run: Run) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    cell = "".join(c if c.isalnum() or c in ".-" else "_" for c in run.row.cell)
+    (folder / f"{cell}_{run.row.run:04d}.png").write_bytes(run.picture or b"")
 
 
-@dataclass(slots=True)
-class _Process:
-    """What one process of the pool keeps."""
+@dataclass(frozen=True, slots=True)
+class _Work:
+    """What every run of an entry needs."""
 
     suite: Suite
     entry: Entry
     commit: str
 
-
-_process: list[_Process] = []  # filled once, in a process of the pool only
-
-
-def _set_up(suite: Suite, entry: Entry, state: str) -> None:
-    _process.append(_Process(suite, entry, state))
+    def fly(self, job: Job) -> Run:
+        return fly_run(self.suite.cells[job.cell].course(job.run), job.run, self.entry, self.commit)
 
 
-def _fly(job: Job) -> Row:
-    kept = _process[0]
-    return fly_run(kept.suite.cells[job.cell].course(job.run), job.run, kept.entry, kept.commit)
+def _flown(work: _Work, todo: list[Job], jobs: int, cluster: str | None) -> Iterator[Run]:
+    if cluster is not None:
+        yield from on_cluster(_Work.fly, work, todo, cluster, jobs)
+    elif jobs == 1 or len(todo) <= 1:
+        yield from map(work.fly, todo)
+    else:
+        yield from side_by_side(_fly, todo, jobs, _set_up, (work,), in_order=False)
+
+
+_process: list[_Work] = []  # filled once, in a process of the pool only
+
+
+def _set_up(work: _Work) -> None:
+    _process.append(work)
+
+
+def _fly(job: Job) -> Run:
+    return _process[0].fly(job)

@@ -2,11 +2,10 @@
 
 A task streams what a local process would leave behind: its status after every episode, and the files of the seed's
 folder at every checkpoint. So the run folder on this machine always holds checkpoints to resume from, wherever a task
-ran; a task that is lost is reported like a process that died. Ray is imported only here (extra ``scale``).
+ran; a task that is lost is reported like a process that died. Needs the extra ``scale``.
 """
 
 import contextlib
-import socket
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -17,14 +16,13 @@ import ray
 from ray.exceptions import RayError
 
 from companion.core.params import ParamError
+from mission.cluster import connected
 from mission.errors import FlightError, InputError
 from mission.training.checkpoint import write_whole
 from mission.training.fleet import Job, Member, OnUpdate, folder_lock, seed_folder
 from mission.training.status import Status
 
-LOCAL = "local"  # ``--cluster local``: a Ray of its own on this machine
 POLL_S = 0.5
-KNOCK_S = 5.0
 
 Files = dict[str, bytes]  # by path below the seed's folder
 News = Status | Files | str  # how it stands, what lies there, what went wrong
@@ -34,9 +32,8 @@ def run_ray_fleet(
     job: Job, seeds: Sequence[int], folder: Path, address: str, jobs: int, on_update: OnUpdate
 ) -> list[Member]:
     """Train every seed on the cluster at ``address``; how each ended, in the order of ``seeds``. Raises InputError."""
-    _connect(address, jobs)
     with contextlib.ExitStack() as stack:
-        stack.callback(ray.shutdown)
+        stack.enter_context(connected(address, jobs))
         members = {seed: Member(seed) for seed in seeds}
         streams: dict[int, Any] = {}
         for seed in seeds:
@@ -69,28 +66,6 @@ def write_files(folder: Path, files: Files) -> None:
         write_whole(path, data)
     for name in set(read_files(folder)) - set(files):
         (folder / name).unlink()
-
-
-def _connect(address: str, jobs: int) -> None:
-    _reach(address)
-    try:
-        if address == LOCAL:
-            ray.init(num_cpus=jobs, include_dashboard=False, log_to_driver=False)
-        else:
-            ray.init(address=address, log_to_driver=False)
-    except (ConnectionError, ValueError, RuntimeError) as error:
-        raise InputError(f"--cluster '{address}': {error}") from error
-
-
-def _reach(address: str) -> None:
-    """Ray itself tries for minutes. ``HOST:PORT`` and ``ray://HOST:PORT`` are knocked at."""
-    host, separator, port = address.removeprefix("ray://").rpartition(":")
-    if not separator:
-        return
-    try:
-        socket.create_connection((host, int(port)), KNOCK_S).close()
-    except (OSError, ValueError, OverflowError) as error:
-        raise InputError(f"--cluster '{address}': nobody answers there ({error})") from error
 
 
 def _train(job: Job, seed: int, files: Files) -> Iterator[News]:

@@ -12,7 +12,7 @@ from companion.navigator import Params
 from mission.bench import run
 from mission.bench.course import Course, Rules
 from mission.bench.document import write_document
-from mission.bench.entry import Entry, fly_run, row_of, run_seed
+from mission.bench.entry import Entry, Run, row_of, run_seed
 from mission.bench.flight import End, fly
 from mission.bench.rows import append, read
 from mission.bench.run import SuiteSpec, entry_folder, fly_missing, missing, read_entry
@@ -132,7 +132,7 @@ def counting_suite(flown):
 
 
 def test_what_is_there_is_not_flown_again(tmp_path, monkeypatch):
-    monkeypatch.setattr(run, "fly_run", lambda course, number, entry, commit: row(number, cell="cell"))
+    monkeypatch.setattr(run, "fly_run", lambda course, number, entry, commit: Run(row(number, cell="cell"), None))
     flown = []
     suite, spec, entry = counting_suite(flown), SuiteSpec("gap"), Entry()
     first = fly_missing(spec, suite, entry, tmp_path / "x")
@@ -168,19 +168,39 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
 
 
 def test_a_failed_run_leaves_a_picture(tmp_path):
-    entry = Entry(pictures=tmp_path)
-    failed = fly_run(open_course(time_limit_s=0.5), 3, entry, "abc")
+    suite = Suite("gap", "", (Cell("a/cell", lambda run_number: open_course(time_limit_s=0.5)),), 1)
+    (failed,) = fly_missing(SuiteSpec("gap"), suite, Entry(), tmp_path)
     assert failed.timeout
-    assert (tmp_path / "cell_0003.png").stat().st_size > 5000
+    assert (tmp_path / "failures" / "cell_0000.png").stat().st_size > 5000
+
+
+@pytest.mark.slow
+def test_a_local_ray_flies_the_same_runs_as_this_process(tmp_path):
+    pytest.importorskip("ray")
+    spec = SuiteSpec("tracks")
+    suite = spec.load()
+
+    def rows_of(folder, cluster):
+        flown = fly_missing(spec, suite, Entry("brake"), folder, runs=1, jobs=2, cluster=cluster)
+        return sorted((row.cell, row.run, row.end, row.time_s, row.path_m) for row in flown)
+
+    assert rows_of(tmp_path / "ray", "local") == rows_of(tmp_path / "here", None)
 
 
 def test_entries_have_folders_of_their_own(tmp_path):
     spec = SuiteSpec("barn", tmp_path, "kept")
     folders = {
         entry_folder(tmp_path, spec, entry)
-        for entry in (Entry(), Entry(profile="tight"), Entry(stress="noise"), Entry(px4_params={"MPC_XY_P": 1.5}))
+        for entry in (
+            Entry(),
+            Entry(profile="tight"),
+            Entry(stress="noise"),
+            Entry(px4_params={"MPC_XY_P": 1.5}),
+            Entry("forest"),
+            Entry("forest", guard=False),
+        )
     }
-    assert len(folders) == 4
+    assert len(folders) == 6
     assert {folder.parent.name for folder in folders} == {"barn_kept"}
 
 
@@ -193,7 +213,7 @@ def test_every_profile_holds_known_parameters_within_their_ranges():
 
 
 def test_one_object_a_suite_for_machines_and_a_document_from_what_was_flown(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(run, "fly_run", lambda course, number, entry, commit: row(number, cell=course.cell))
+    monkeypatch.setattr(run, "fly_run", lambda course, number, entry, commit: Run(row(number, cell=course.cell), None))
     assert main(["bench", "pole", "--runs", "2", "--out", str(tmp_path), "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
     asked = ("runs", "success", "collision", "timeout", "spl", "mean_time_s", "score_05", "score_025")

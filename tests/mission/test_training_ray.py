@@ -11,9 +11,10 @@ pytest.importorskip("ray")
 
 from pendulum_kit import PendulumJob
 
+from mission.cluster import LOCAL
 from mission.errors import InputError
 from mission.training.fleet import Member, run_fleet
-from mission.training.ray_fleet import LOCAL, read_files, run_ray_fleet, write_files
+from mission.training.ray_fleet import read_files, run_ray_fleet, write_files
 from mission.training.status import Status
 
 EPISODES = 10
