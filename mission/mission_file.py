@@ -81,7 +81,7 @@ class Mission(StrictModel):
     wind: WindSpec = WindSpec()
     noise: NoiseSpec = NoiseSpec()
     faults: tuple[str, ...] = ()  # NAME[=VALUE][@START[..END]], see sitl.faults
-    policy: str = GeometricExpert.name  # or a shipped one, or the folder of one
+    policy: str = "forest"  # or another shipped one, geometric, or the folder of one
     success: Success
     params: dict[str, dict[str, Any]] = Field(default_factory=dict)
 

@@ -75,15 +75,15 @@ def fly_and_judge(plan: FlightPlan, folder: Path) -> Result:
     return judge(plan, folder, TIMED_OUT.format(plan.mission.success.time_limit_s) if flight.timed_out else None)
 
 
-def fly_row(mission: str, seed: int) -> Result:
-    """One row of a table; the logs are not kept."""
+def fly_row(mission: str, seed: int, policy: str | None = None) -> Result:
+    """One row of a table, by the mission's policy or by another; the logs are not kept."""
     with tempfile.TemporaryDirectory() as folder:
-        return fly_and_judge(plan_flight(mission, seed), Path(folder))
+        return fly_and_judge(plan_flight(mission, seed, policy=policy), Path(folder))
 
 
-def fly_rows(mission: str, seeds: Sequence[int], jobs: int = 1) -> Iterator[Result]:
+def fly_rows(mission: str, seeds: Sequence[int], jobs: int = 1, policy: str | None = None) -> Iterator[Result]:
     """All rows, in the order of the seeds, each as soon as it is there."""
-    work = [(mission, seed) for seed in seeds]
+    work = [(mission, seed, policy) for seed in seeds]
     if jobs == 1:
         yield from itertools.starmap(fly_row, work)
         return
@@ -145,6 +145,7 @@ def main(
     table: Annotated[str, typer.Argument(help="trajectory1, trajectory2, trajectory1_movers or forest100.")],
     seeds: Annotated[str | None, typer.Option(help="FIRST:END, END excluded; default: the whole table.")] = None,
     jobs: Annotated[int, typer.Option(min=1, max=64, help="Processes.")] = 1,
+    policy: Annotated[str | None, typer.Option(help="Who flies in RL mode, instead of the mission's.")] = None,
     json: Json = False,
 ) -> None:
     """Fly a table and judge it. Exit code 0 only where it holds what is asked for."""
@@ -152,10 +153,11 @@ def main(
     try:
         asked = table_named(table)
         chosen = chosen_seeds(seeds, asked)
+        plan_flight(asked.mission, chosen[0], policy=policy)  # a wrong name is refused before anything flies
     except InputError as error:
         print(f"tables: {error}", file=sys.stderr)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    results = list(track(fly_rows(asked.mission, chosen, jobs), table, len(chosen), console=console))
+    results = list(track(fly_rows(asked.mission, chosen, jobs, policy), table, len(chosen), console=console))
     figures = summary(table, results)
     print_table(figures, console)
     if json:
@@ -182,7 +184,7 @@ def _missed(asked: Asked, figures: dict[str, Any]) -> list[str]:
     return missed
 
 
-def _fly_item(item: tuple[str, int]) -> Result:
+def _fly_item(item: tuple[str, int, str | None]) -> Result:
     return fly_row(*item)
 
 

@@ -73,7 +73,7 @@ def test_an_interval_holds_its_rate_and_mirrors(trials: tuple[int, int]) -> None
 def test_a_flight_of_the_expert_is_that_of_the_tables() -> None:
     from mission.tables import fly_row
 
-    flight, row = fly_one(EvalSpec("geometric", "trajectory1"), 3), fly_row("trajectory1", 3)
+    flight, row = fly_one(EvalSpec("geometric", "trajectory1"), 3), fly_row("trajectory1", 3, "geometric")
     assert (flight.success, flight.time_s, flight.path_m) == (row.success, row.time_s, row.path_m)
     assert (flight.switches, flight.switches_bound) == (row.switches, row.switches_bound)
     assert flight.path_ratio == pytest.approx(row.path_ratio)
