@@ -11,7 +11,7 @@ from companion.core.task import Task
 from companion.core.types import NavMode, Setpoint, VehicleState
 from companion.guidance import landing, limits, line
 from companion.navigator.decide import Answer, Decision, Judge, settle
-from companion.navigator.memory import Engagement, Memory
+from companion.navigator.memory import Engagement, Memory, Path
 from companion.navigator.params import Params
 from companion.navigator.track import Route, Tracked, course_along, track, turned
 from companion.perception.perceive import Percept
@@ -92,7 +92,7 @@ def _follow(memory: Memory, engaged: Engagement, scene: Scene, asked: Asked | No
             memory, engaged, asked.query, asked.answer, scene.percept, scene.params, asked.judge
         )
     path, params = engaged.path, scene.params
-    if path is None or _must_stop(scene):
+    if path is None or _must_stop(scene, _stop_margin(path, scene.params)):
         held = _held(memory, replace(engaged, path=None), scene)
         return replace(held, decision=decision)
     margin_m = min(params.vehicle.corridor_m, path.margin_m)
@@ -118,12 +118,17 @@ def _land(memory: Memory, engaged: Engagement, scene: Scene) -> Steered:
     return Steered(memory, engaged, setpoint, touchdown=command.touchdown)
 
 
-def _must_stop(scene: Scene) -> bool:
-    """Would going on as now touch something remembered before the vehicle stands?"""
+def _stop_margin(path: Path, params: Params) -> float:
+    """What the stop rule adds to the hull: a path with a run-out meets the next at full speed, and leaves it."""
+    return params.policy.learned_stop_margin_m if path.run_out_m > 0.0 else 0.0
+
+
+def _must_stop(scene: Scene, margin_m: float = 0.0) -> bool:
+    """Would going on as now touch something remembered, or come within the margin of it, before the vehicle stands?"""
     return limits.velocity_stop_needed(
         scene.state.pos_ned_m,
         scene.state.vel_ned_m_s,
         scene.percept.static_ne_m,
-        scene.params.vehicle.radius_m,
+        scene.params.vehicle.radius_m + margin_m,
         scene.params.limits,
     )
