@@ -1,4 +1,4 @@
-"""``swiftnav clone``: a policy that learns the geometric expert's ways by flying itself; resumable at any moment."""
+"""``swiftnav clone``: a policy that learns a teacher's ways by flying itself; resumable at any moment."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from mission.training.dagger import Standing
 
 World = Annotated[str | None, typer.Option(help="A mission's world, a world file, or KIND[:SPLIT[:COUNT]].")]
+TeacherName = Annotated[str, typer.Option("--teacher", help="geometric: the expert; map: who knows the true map.")]
 Observation = Annotated[str, typer.Option(help="What the policy sees: map, corridors, goal or paper.")]
 Rounds = Annotated[int, typer.Option(min=1, max=100, help="Of flying and cloning.")]
 Flights = Annotated[int, typer.Option(min=1, max=100_000, help="Of a round.")]
@@ -26,6 +27,7 @@ DEFAULT_WORLD = "mixed:train"
 def clone(
     context: typer.Context,
     world: World = None,
+    teacher: TeacherName = "geometric",
     observation: Observation = "map",
     rounds: Rounds = 5,
     flights: Flights = 40,
@@ -35,7 +37,7 @@ def clone(
     resume: Resume = None,
     json: Json = False,
 ) -> None:
-    """Learn the geometric expert's ways by DAgger: fly, be told at each decision what it would do, clone, repeat."""
+    """Learn a teacher's ways by DAgger: fly, be told at each decision what it would do, clone, repeat."""
     require_extra("train", "clone")
     from mission.training.dagger import run
     from mission.training.dagger_config import DaggerConfig, read_config, write_config
@@ -47,6 +49,7 @@ def clone(
     else:
         config = DaggerConfig(
             world=world or DEFAULT_WORLD,
+            teacher=teacher,
             observation=observation,
             rounds=rounds,
             flights=flights,
@@ -63,7 +66,7 @@ def clone(
         figures = {"loss": learned.loss, "held_out_loss": learned.held_out_loss, "agreement": learned.agreement}
         print_json({"folder": str(folder), "policy": str(policy), **figures})
         return
-    typer.echo(f"{policy}: same or neighbouring heading as the expert in {learned.agreement:.0%} of what was held out")
+    typer.echo(f"{policy}: same or neighbouring heading as the teacher in {learned.agreement:.0%} of what was held out")
 
 
 class _Shown:

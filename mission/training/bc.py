@@ -109,9 +109,9 @@ def spread(heading_rad: F64, params: DecoderParams, sigma_rad: float = 0.12) -> 
     return _normed(chances)
 
 
-def by_cost(cost_m: F64, temperature_m: float = 0.5) -> F32:
+def by_cost(cost: F64, temperature: float) -> F32:
     """Chances (n, 41) from what each heading costs to the goal (n, 41), inf where there is no way; one is finite."""
-    better = np.exp((cost_m.min(axis=1, keepdims=True) - cost_m) / temperature_m)
+    better = np.exp((cost.min(axis=1, keepdims=True) - cost) / temperature)
     return _normed(better)
 
 

@@ -1,9 +1,9 @@
-"""How does a ranking of headings learn the expert's ways? DAgger: who learns flies, the teacher says what it would do.
+"""How does a ranking of headings learn a teacher's ways? DAgger: who learns flies, the teacher says what it would do.
 
 Each round flies missions with the policy of the round before, on the full vehicle with noise, latency and wind drawn
-for each flight. At every decision the geometric expert, asked the same, shows its way; its heading is the label. Then
-all that was ever seen is cloned anew. In a declared share of decisions the teacher steers itself, and in a few chance
-does, so that places are seen that neither would have come to.
+for each flight. At every decision the teacher, asked the same, ranks the headings: that is the label. Then all that was
+ever seen is cloned anew. In a declared share of decisions the teacher steers itself, and in a few chance does, so that
+places are seen that neither would have come to.
 
 Everything lies in the run's folder: a flight is a function of (settings, number, policy of the round before), so a run
 that was killed goes on with the next flight and ends with the same weights.
@@ -25,7 +25,6 @@ from companion.navigator import Params
 from companion.policy import headings
 from companion.policy.actor import Actor
 from companion.policy.decoder import DecoderParams
-from companion.policy.expert import GeometricExpert
 from companion.policy.learned import PolicySpec
 from companion.policy.observations import SIZES, observe, remember
 from companion.policy.store import Card, read_policy, save_policy
@@ -36,6 +35,7 @@ from mission.training.checkpoint import write_whole
 from mission.training.dagger_config import DaggerConfig
 from mission.training.env_config import EnvConfig, flight_spec, navigator_params
 from mission.training.episode import Episode
+from mission.training.teachers import ExpertTeacher, MapTeacher, Teacher
 from mission.training.training_worlds import WorldSource, world_source
 
 F32 = NDArray[np.float32]
@@ -47,7 +47,7 @@ class Lesson:
     """What one flight taught."""
 
     observations: F32  # (n, size)
-    headings_rad: F64  # (n,) the teacher's, off the goal bearing
+    labels: F32  # (n, 41) the teacher's chances of the headings
     figures: dict[str, Any]
 
 
@@ -97,11 +97,11 @@ def run(config: DaggerConfig, folder: Path, shown: Callable[[Standing], None]) -
             lessons.append(_lesson(config, folder, number, index, actor, source))
             ours = lessons[number * config.flights :]
             won = sum(lesson.figures["success"] for lesson in ours)
-            shown(Standing(number, index + 1, sum(len(lesson.headings_rad) for lesson in lessons), won))
+            shown(Standing(number, index + 1, sum(len(lesson.labels) for lesson in lessons), won))
         kept = folder / f"round-{number}"
         taught = _cloned(config, number, lessons, kept)
         actor = taught.actor
-        shown(Standing(number, config.flights, sum(len(lesson.headings_rad) for lesson in lessons), won, taught))
+        shown(Standing(number, config.flights, sum(len(lesson.labels) for lesson in lessons), won, taught))
     assert taught is not None  # at least one round
     return taught
 
@@ -115,7 +115,7 @@ def flown(config: DaggerConfig, number: int, index: int, actor: Actor | None, so
     spec = config.policy_spec()
     steering = _Steering(actor, spec, config.share_of_expert(number), config.random_share, rng)
     episode = Episode(flight_spec(source.draw(rng), int(rng.integers(2**31)), env, params))
-    return _taught(episode, steering, GeometricExpert(params.expert, params.map), params)
+    return _taught(episode, steering, _teacher(config, episode, params), params)
 
 
 def drawn(config: DaggerConfig, rng: np.random.Generator) -> EnvConfig:
@@ -131,36 +131,42 @@ def drawn(config: DaggerConfig, rng: np.random.Generator) -> EnvConfig:
     )
 
 
-def dataset(lessons: list[Lesson], params: DecoderParams, sigma_rad: float) -> Dataset:
-    """All lessons as one, labels spread over neighbouring headings."""
-    taught_rad = np.concatenate([lesson.headings_rad for lesson in lessons])
+def dataset(lessons: list[Lesson]) -> Dataset:
+    """All lessons as one."""
     return Dataset(
-        np.concatenate([lesson.observations for lesson in lessons]), bc.spread(taught_rad, params, sigma_rad)
+        np.concatenate([lesson.observations for lesson in lessons]),
+        np.concatenate([lesson.labels for lesson in lessons]),
     )
 
 
-def _taught(episode: Episode, steering: _Steering, teacher: GeometricExpert, params: Params) -> Lesson:
+def _teacher(config: DaggerConfig, episode: Episode, params: Params) -> Teacher:
+    decoder_params = config.policy_spec().decoder_params
+    if config.teacher == "map":
+        return MapTeacher(episode.flight.spec.plan, decoder_params, config.temperature_s)
+    return ExpertTeacher(params, decoder_params, config.sigma_rad)
+
+
+def _taught(episode: Episode, steering: _Steering, teacher: Teacher, params: Params) -> Lesson:
     """Fly to the end; where the teacher knows no way nothing is learned."""
     spec = steering.spec
     seen_all: list[F64] = []
-    taught_all: list[float] = []
+    labels_all: list[F32] = []
     memory: F64 | None = None
-    way: F64 | None = None
     while (query := episode.query) is not None:
-        shown, way = teacher.propose(query, way)
-        if shown is None:
+        taught = teacher.taught(query)
+        if taught is None:
             episode.decide(None, memory)
             continue
         seen = observe(spec.observation, query, memory, params.map)
-        taught_rad = headings.encode_heading(shown.waypoints_ne_m, query, spec.decoder_params)
-        proposal, heading_rad = headings.ranked(steering.logits(seen, taught_rad), query, spec.decoder_params)
+        proposal, heading_rad = headings.ranked(steering.logits(seen, taught.heading_rad), query, spec.decoder_params)
         seen_all.append(seen)
-        taught_all.append(taught_rad)
+        labels_all.append(taught.labels)
         memory = remember(query, memory, heading_rad, 0.0)
         episode.decide(proposal, memory)
     figures = episode.figures()
-    observations = np.array(seen_all, np.float32).reshape(len(seen_all), SIZES[spec.observation])
-    return Lesson(observations, np.array(taught_all), {key: figures[key] for key in KEPT})
+    observations = np.array(seen_all, np.float32).reshape(-1, SIZES[spec.observation])
+    labels = np.array(labels_all, np.float32).reshape(-1, headings.HEADINGS)
+    return Lesson(observations, labels, {key: figures[key] for key in KEPT})
 
 
 def _lesson(
@@ -171,13 +177,13 @@ def _lesson(
     if path.is_file():
         with np.load(path) as kept:
             figures = json.loads(str(kept["figures"]))
-            return Lesson(kept["observations"], kept["headings_rad"], figures)
+            return Lesson(kept["observations"], kept["labels"], figures)
     lesson = flown(config, number, index, actor, source)
     buffer = io.BytesIO()
     np.savez(
         buffer,
         observations=lesson.observations,
-        headings_rad=lesson.headings_rad,
+        labels=lesson.labels,
         figures=np.array(json.dumps(lesson.figures)),
     )
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -191,15 +197,15 @@ def _cloned(config: DaggerConfig, number: int, lessons: list[Lesson], folder: Pa
     if (folder / "card.json").is_file():
         card, actor = read_policy(folder)
         return Clone(actor, *(float(card.training[key]) for key in ("loss", "held_out_loss", "agreement")))
-    told = [lesson for lesson in lessons if len(lesson.headings_rad)]
+    told = [lesson for lesson in lessons if len(lesson.labels)]
     if not told:
         raise InputError(f"no flight needed a decision: there is nothing to learn in '{config.world}'")
     clone_config = CloneConfig(observation=config.observation, hidden=config.hidden, steps=config.steps)
-    result = bc.clone(dataset(told, spec.decoder_params, config.sigma_rad), clone_config, config.seed)
+    result = bc.clone(dataset(told), clone_config, config.seed)
     training = {
         **dataclasses.asdict(config),
         "round": number,
-        "decisions": sum(len(lesson.headings_rad) for lesson in lessons),
+        "decisions": sum(len(lesson.labels) for lesson in lessons),
         "loss": result.loss,
         "held_out_loss": result.held_out_loss,
         "agreement": result.agreement,

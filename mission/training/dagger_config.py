@@ -12,6 +12,7 @@ from mission.strict_yaml import read_yaml, write_yaml
 from mission.training.configure import configured, plain
 
 FILE = "dagger.yaml"
+TEACHERS = ("geometric", "map")
 Span = tuple[float, float]  # a flight draws uniformly from it
 
 
@@ -21,6 +22,7 @@ class DaggerConfig:
 
     name: str = "forest"  # of the policy
     world: str = "mixed:train"  # see ``world_source``
+    teacher: str = "geometric"  # the expert; or ``map``: who knows the true map, see ``map_teacher``
     observation: str = "map"  # see ``companion.policy.observations``
     hidden: tuple[int, ...] = (256, 256)
     seed: int = 1
@@ -29,7 +31,8 @@ class DaggerConfig:
     expert_share: tuple[float, ...] = (1.0, 0.3, 0.1, 0.0)  # of the decisions, by round; the last holds on
     random_share: float = 0.05
     steps: int = 4000  # of a cloning
-    sigma_rad: float = 0.12  # of the labels: about a heading's width
+    sigma_rad: float = 0.12  # of the expert's labels: about a heading's width
+    temperature_s: float = 0.1  # of those by cost: so much dearer is 1/e as likely
     range_sigma_m: Span = (0.0, 0.04)
     dropout: Span = (0.0, 0.02)
     latency_s: Span = (0.03, 0.1)
@@ -42,6 +45,8 @@ class DaggerConfig:
         if self.observation not in observations.SIZES:
             known = list(observations.SIZES)
             raise InputError(f"unknown observation '{self.observation}'{nearest(self.observation, known)}")
+        if self.teacher not in TEACHERS:
+            raise InputError(f"unknown teacher '{self.teacher}'{nearest(self.teacher, list(TEACHERS))}")
         for field in ("rounds", "flights", "steps"):
             if getattr(self, field) < 1:
                 raise InputError(f"{field} = {getattr(self, field)} wants at least 1")

@@ -93,8 +93,12 @@ TRAJECTORY2 = replace(
 )
 PLAIN = RewardTable("plain", step=-0.01, goal=5.0, crash=-5.0, failure=-5.0)
 WAY = RewardTable("way", step=-0.03, way=0.3, goal=5.0, crash=-5.0, failure=-5.0)
+WAY_OPEN = replace(WAY, name="way_open", step=-0.01, failure=-10.0)  # unfenced: flying out must not end a bad day
 
-TABLES = {table.name: table for table in (TRAJECTORY1, TRAJECTORY2, TRAJECTORY1_PAPER, TRAJECTORY2_PAPER, PLAIN, WAY)}
+TABLES = {
+    table.name: table
+    for table in (TRAJECTORY1, TRAJECTORY2, TRAJECTORY1_PAPER, TRAJECTORY2_PAPER, PLAIN, WAY, WAY_OPEN)
+}
 VARIANTS = {"default": "", "paper": "_paper"}
 
 

@@ -65,6 +65,14 @@ def two(rng: np.random.Generator) -> Site:
     return _sparsely_wooded(site, rng)
 
 
+def rows(rng: np.random.Generator) -> Site:
+    """Two rows of clusters across the way, with gaps of 1.2 to 1.8 m, a few trees round them."""
+    site = parts.yard()
+    for north_m in (rng.uniform(15.0, 23.0), rng.uniform(32.0, 44.0)):
+        site = parts.with_row(site, rng, north_m, gap_m=(1.2, 1.8))
+    return parts.with_trees(site, rng, 0.015, (0.3, 0.45))
+
+
 def t2like(rng: np.random.Generator) -> Site:
     """Like trajectory2: a fenced garden, a deep arc on the line, rows of clusters with gaps of 1.2 to 1.8 m."""
     arc = parts.ArcDraw(radius_m=(6.0, 8.0), half_deg=(60.0, 80.0), turn_deg=10.0, shift_m=1.5)
@@ -87,10 +95,11 @@ def mixed(rng: np.random.Generator) -> Site:
 
 
 MIXTURE: tuple[tuple[Callable[[np.random.Generator], Site], float], ...] = (
-    (forest, 0.25),
+    (forest, 0.20),
     (clutter, 0.10),
-    (barrier, 0.45),
+    (barrier, 0.35),
     (deep, 0.20),
+    (rows, 0.15),
 )
 KINDS: dict[str, Callable[[np.random.Generator], Site]] = {
     "forest": forest,
@@ -98,6 +107,7 @@ KINDS: dict[str, Callable[[np.random.Generator], Site]] = {
     "barrier": barrier,
     "deep": deep,
     "two": two,
+    "rows": rows,
     "t2like": t2like,
     "pocket": pocket,
     "mixed": mixed,

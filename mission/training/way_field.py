@@ -21,6 +21,7 @@ from mission.world_check import clearance_grid
 from sitl.world import World
 
 CELL_M = 0.3
+LIMITS = LimitsParams()
 WORLDS = 64  # whose fields are kept
 SLOWEST_M_S = 0.3  # where the vehicle does not fit: a way out of there, too
 
@@ -45,15 +46,20 @@ class WayField:
 @lru_cache(maxsize=WORLDS)
 def way_field(world: World, radius_m: float, cruise_m_s: float) -> WayField:
     """The field of a world. Movers do not count."""
-    limits = LimitsParams()
-    clearance, cell_m = clearance_grid(world, radius_m + limits.side_full_m, CELL_M)
-    beside = np.clip((clearance - radius_m) / limits.side_full_m, 0.0, 1.0)
-    speed = limits.side_min_m_s + (cruise_m_s - limits.side_min_m_s) * beside
-    seconds = _seconds_to(_cell_of(world, clearance.shape, cell_m), cell_m / speed, clearance >= radius_m)
+    clearance, cell_m = clearance_grid(world, radius_m + LIMITS.side_full_m, CELL_M)
+    cell_s = cell_m / speed_m_s(clearance, radius_m, cruise_m_s)
+    seconds = _seconds_to(_cell_of(world, clearance.shape, cell_m), cell_s, clearance >= radius_m)
     reached = np.isfinite(seconds)
     apart, nearest = distance_transform_edt(~reached, return_indices=True)
     seconds = seconds[tuple(nearest)] + apart * cell_m / SLOWEST_M_S
     return WayField(seconds, world.bounds_m[:2], cell_m)
+
+
+def speed_m_s(clearance_m: F64, radius_m: float, cruise_m_s: float) -> F64:
+    """How fast the navigator flies that near to obstacles."""
+    beside = np.clip((clearance_m - radius_m) / LIMITS.side_full_m, 0.0, 1.0)
+    speed: F64 = LIMITS.side_min_m_s + (cruise_m_s - LIMITS.side_min_m_s) * beside
+    return speed
 
 
 def _cell_of(world: World, shape: tuple[int, ...], cell_m: float) -> tuple[int, int]:

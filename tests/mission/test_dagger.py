@@ -6,14 +6,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from companion.policy.headings import headings_rad
+from companion.policy.headings import HEADINGS, headings_rad
 from companion.policy.store import read_policy
 from mission.errors import InputError
-from mission.training.dagger import Lesson, Standing, dataset, run
+from mission.training.dagger import Standing, run
 from mission.training.dagger_config import DaggerConfig, read_config, write_config
+from mission.training.env_config import EnvConfig, flight_spec, navigator_params
+from mission.training.episode import Episode
+from mission.training.teachers import ExpertTeacher, MapTeacher
+from sitl.world import World, wall_box
 
 BRIEF = DaggerConfig(
     world="forest:train:3", rounds=2, flights=1, steps=10, hidden=(8,), time_limit_s=5.0, expert_share=(1.0, 0.0)
+)
+POCKET = World(  # a wall close ahead that reaches far to the left
+    name="pocket",
+    start_ned_m=np.zeros(2),
+    goal_ned_m=np.array([20.0, 0.0]),
+    bounds_m=(-10.0, -20.0, 30.0, 20.0),
+    circles=np.zeros((0, 4)),
+    boxes=np.array([wall_box((2.5, -15.0), (2.5, 3.0), 0.3, np.inf)]),
 )
 
 
@@ -43,12 +55,20 @@ def test_a_run_that_was_killed_goes_on_and_ends_with_the_same_weights(tmp_path: 
     assert actor.sizes() == (50, 8, 41)
 
 
-def test_labels_peak_at_the_teachers_heading() -> None:
-    params = BRIEF.policy_spec().decoder_params
-    lesson = Lesson(np.zeros((3, 50), np.float32), headings_rad(params)[[0, 20, 33]], {})
-    data = dataset([lesson, lesson], params, 0.12)
-    assert data.labels.argmax(axis=1).tolist() == [0, 20, 33] * 2
-    assert np.allclose(data.labels.sum(axis=1), 1.0)
+def test_the_expert_teaches_the_heading_of_its_path_and_who_knows_the_map_the_quickest() -> None:
+    config = EnvConfig(range_sigma_m=0.0, spawn_jitter_m=0.0, wind_m_s=(0.0, 0.0))
+    params, decoder = navigator_params(config), BRIEF.policy_spec().decoder_params
+    episode = Episode(flight_spec(POCKET, 1, config, params))
+    assert episode.query is not None
+    wall = MapTeacher(episode.flight.spec.plan, decoder, 0.1)
+    for teacher in (ExpertTeacher(params, decoder, 0.12), wall):
+        taught = teacher.taught(episode.query)
+        assert taught is not None
+        assert taught.labels.shape == (HEADINGS,) and taught.labels.sum() == pytest.approx(1.0)
+        assert abs(headings_rad(decoder)[taught.labels.argmax()] - taught.heading_rad) < 0.1
+        assert taught.heading_rad > 0.0  # the wall is open to the right
+    cost_s = wall.cost_s(episode.query)
+    assert np.isinf(cost_s).any() and cost_s[np.isfinite(cost_s)].min() > 20.0 / config.cruise_m_s
 
 
 def test_the_teachers_share_of_the_last_round_holds_on() -> None:
@@ -69,6 +89,7 @@ def test_a_run_keeps_its_settings_and_a_folder_in_use_is_refused(tmp_path: Path)
     ("change", "told"),
     [
         ({"observation": "mop"}, "did you mean 'map'"),
+        ({"teacher": "mapp"}, "did you mean 'map'"),
         ({"rounds": 0}, "rounds = 0"),
         ({"random_share": 1.5}, "share of 1.5"),
         ({"expert_share": ()}, "one number a round"),

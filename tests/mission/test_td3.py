@@ -281,7 +281,7 @@ def test_chances_peak_at_the_teachers_heading_and_at_the_least_cost() -> None:
     assert chances.sum(axis=1) == pytest.approx([1.0, 1.0])
     cost = np.full((1, HEADINGS), np.inf)
     cost[0, [3, 30]] = 5.0, 5.5
-    assert bc.by_cost(cost, temperature_m=0.5)[0, [3, 30]] == pytest.approx(np.array([np.e, 1.0]) / (1.0 + np.e))
+    assert bc.by_cost(cost, temperature=0.5)[0, [3, 30]] == pytest.approx(np.array([np.e, 1.0]) / (1.0 + np.e))
 
 
 def test_a_trained_actor_can_be_shipped(tmp_path: Path) -> None:
