@@ -218,8 +218,7 @@ def swept_free_length(
 def _brushed(cut: "_Cut", points_ned_m: F64, reach_m: float) -> F64:
     """The points in a rectangle round one of the pieces: every point within reach_m is among them."""
     along, lateral = _in_segments(cut, points_ned_m)
-    half = cut.length_m / 2.0
-    inside = (np.abs(lateral) < reach_m) & (np.abs(along - half) < half + reach_m)
+    inside = (np.abs(lateral) < reach_m) & (np.abs(along - cut.half_m) < cut.half_m + reach_m)
     brushed: F64 = points_ned_m.compress(inside.any(axis=0), axis=0)
     return brushed
 
@@ -229,10 +228,11 @@ def _first_contact(cut: "_Cut", points_ned_m: F64, required_m: F64) -> float:
     along, lateral = _in_segments(cut, points_ned_m)
     chord = required_m * required_m - lateral * lateral
     half = np.sqrt(np.maximum(chord, 0.0))
-    touched = (chord > 0.0) & (along + half > 0.0) & (along - half < cut.length_m)
+    begin = along - half
+    touched = (chord > 0.0) & (along + half > 0.0) & (begin < cut.length_m)
     if not touched.any():
         return math.inf
-    entry: F64 = cut.s_m + np.maximum(along - half, 0.0)
+    entry: F64 = cut.s_m + np.maximum(begin, 0.0)
     return float(entry[touched].min())
 
 
@@ -250,6 +250,7 @@ class _Cut(NamedTuple):
     start: NDArray[np.complex128]
     back: NDArray[np.complex128]  # direction, conjugate: turns it to 1
     length_m: F64
+    half_m: F64
     s_m: F64
 
 
@@ -269,6 +270,9 @@ def _cut_of(vertices: bytes) -> _Cut:
             pieces.append(Segment(north, east, dn / length, de / length, length, s))
             s += length
             north, east = next_north, next_east
-    rows = [(complex(p.north_m, p.east_m), complex(p.dir_north, -p.dir_east), p.length_m, p.s_m) for p in pieces]
-    start, back, lengths, starts = np.array(rows).reshape(-1, 4, 1).swapaxes(0, 1)
-    return _Cut(tuple(pieces), start, back, lengths.real, starts.real)
+    rows = [
+        (complex(p.north_m, p.east_m), complex(p.dir_north, -p.dir_east), p.length_m, p.length_m / 2.0, p.s_m)
+        for p in pieces
+    ]
+    start, back, lengths, halves, starts = np.array(rows).reshape(-1, 5, 1).swapaxes(0, 1)
+    return _Cut(tuple(pieces), start, back, lengths.real, halves.real, starts.real)

@@ -165,7 +165,7 @@ def _certain(grid: GridMap, scan: PolarScan, params: MapParams) -> F32:
     table = _polar_table(params.cell_m, round(params.sense_m / params.cell_m))
     eroded = _eroded((np.minimum(scan.free_m, params.sense_m) - params.noise_m).astype(np.float32), table)
     (i, sub_i), (j, sub_j) = (_sub_cell(place_m / grid.cell_m) for place_m in scan.pos_ne_m.tolist())
-    reach = eroded.ravel().take(table.ring_bin[sub_i, sub_j])
+    reach = eroded.ravel().take(table.ring_bin[sub_i, sub_j], mode="wrap")  # none is outside: quicker than a check
     certain = np.zeros(grid.free_t.shape, np.float32)
     window, part = _window(len(certain), i - grid.corner[0], j - grid.corner[1], table.radius_cells)
     certain[window] = (table.far_edge_m[sub_i, sub_j] < reach)[part]

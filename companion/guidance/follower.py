@@ -57,9 +57,10 @@ def progress(path_ned_m: F64, pos_ned_m: F64, s_min_m: float, params: FollowerPa
     return geometry.project(path_ned_m, pos_ned_m, s_min_m, s_min_m + params.window_m)
 
 
-def follow(path_ned_m: F64, state: VehicleState, s_min_m: float, target: Target, params: FollowerParams) -> Followed:
-    """Setpoint that follows the path from progress s_min_m on. A NaN state asks to stay where the path is."""
-    at = progress(path_ned_m, state.pos_ned_m, s_min_m, params)
+def follow(
+    path_ned_m: F64, state: VehicleState, at: geometry.Projection, target: Target, params: FollowerParams
+) -> Followed:
+    """Setpoint that follows the path from ``progress`` on. A NaN state asks to stay where the path is."""
     pieces = geometry.segments(path_ned_m)
     speed = target.speed_m_s * _share_off_path(at.distance_m, params)
     if target.course_rad is None:

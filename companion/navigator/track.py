@@ -51,7 +51,7 @@ def track(route: Route, state: VehicleState, percept: Percept, yaw_rad: float, p
     speed = limits.path_speed(route.vertices_ne_m, at.s_m, route.cruise_m_s, ahead, params.limits)
     speed = limits.limit_rise(speed, state.vel_ned_m_s, geometry.tangent_at(route.vertices_ne_m, at.s_m), params.limits)
     target = follower.Target(speed, route.down_m, yaw_rad, route.course_rad)
-    followed = follower.follow(route.vertices_ne_m, state, route.s_m, target, params.follower)
+    followed = follower.follow(route.vertices_ne_m, state, at, target, params.follower)
     return Tracked(followed.setpoint, followed.s_m, followed.lateral_m, speed, free_m)
 
 

@@ -81,14 +81,14 @@ def _in_body_plane(rotation: F64) -> tuple[F64, F64]:
     return in_plane[:, 0], in_plane[:, 1]
 
 
-def _sector_of(bearing_rad: F64, scan: Scan) -> NDArray[np.intp]:
-    """Sector that holds each bearing."""
+def _sector_of(bearing_rad: F64 | np.float64, scan: Scan) -> NDArray[np.intp]:
+    """Sector that holds each bearing, or the one."""
     first_edge = scan.angle_offset_rad - scan.increment_rad / 2
     turns = (bearing_rad - first_edge) * (1.0 / math.tau)
     turns -= np.floor(turns)
     turns *= math.tau / scan.increment_rad
-    sector = turns.astype(np.intp)
-    sector[sector >= scan.range_m.shape[0]] = 0  # a full turn, by rounding
+    sector: NDArray[np.intp] = turns.astype(np.intp)
+    sector *= sector < scan.range_m.shape[0]  # a full turn, by rounding, is sector 0
     return sector
 
 
@@ -107,7 +107,7 @@ def _ground_slant_m(scan: Scan, rotation: F64, height_m: float) -> F64:
     cosine, sine = _edges(n, scan.angle_offset_rad, scan.increment_rad)
     drop = forward * cosine + right * sine  # metres down per slant metre
     steepest = np.maximum(drop[:-1], drop[1:])
-    steepest[_sector_of(np.array([math.atan2(right, forward)]), scan)] = most
+    steepest[_sector_of(np.float64(math.atan2(right, forward)), scan)] = most
     slant_m: F64 = height_m / np.maximum(steepest, LEVEL)
     slant_m[steepest <= LEVEL] = np.inf
     return slant_m

@@ -75,7 +75,8 @@ class Ompl(Recipe):
             return own, Wish("no way" if plan is None else "stop", decided=due)
         speed = _speed(view, plan)
         target = follower.Target(speed, view.down_m, view.yaw_sp_rad)
-        followed = follower.follow(plan.path_ne_m, view.state, plan.s_m, target, view.params.follower)
+        at = follower.progress(plan.path_ne_m, view.state.pos_ned_m, plan.s_m, view.params.follower)
+        followed = follower.follow(plan.path_ne_m, view.state, at, target, view.params.follower)
         course = course_along(plan.path_ne_m, plan.s_m)
         wish = Wish("follow", setpoint=followed.setpoint, course_rad=course, decided=due, path_ne_m=plan.path_ne_m)
         return Own(replace(plan, s_m=followed.s_m)), wish

@@ -8,14 +8,21 @@ from hypothesis import strategies as st
 from point_mass import DOWN_M, PointMass
 
 from companion.core import geometry
-from companion.core.types import F64
-from companion.guidance.follower import FollowerParams, Target, follow
+from companion.core.types import F64, VehicleState
+from companion.guidance import follower
+from companion.guidance.follower import Followed, FollowerParams, Target
 from companion.guidance.limits import Ahead, LimitsParams, limit_rise, path_speed
 
 PARAMS = FollowerParams()
 LIMITS = LimitsParams()
 OPEN = Ahead(free_length_m=50.0, clearance_m=5.0, s_fuzzy=1.0)
 LINE = np.array([[0.0, 0.0], [60.0, 0.0]])
+
+
+def follow(path: F64, state: VehicleState, s_min_m: float, target: Target, params: FollowerParams) -> Followed:
+    """From progress s_min_m on."""
+    at = follower.progress(path, state.pos_ned_m, s_min_m, params)
+    return follower.follow(path, state, at, target, params)
 
 
 def slalom(wavelength_m: float) -> F64:
