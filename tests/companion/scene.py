@@ -13,6 +13,7 @@ from companion.core.inputs import Inputs
 from companion.core.task import Task
 from companion.core.types import AutopilotStatus, LandedState, VehicleState
 from companion.navigator import Memory, Params, Record
+from companion.policy.expert import GeometricExpert
 from mission.flight_plan import FlightPlan, plan_flight
 from mission.simulate import fly_in_process
 from sitl.lidar import Lidar, LidarParams
@@ -122,7 +123,7 @@ class Flight:
 @functools.cache
 def flight(mission: str, seed: int) -> Flight:
     """The whole flight in process."""
-    flown = Flight(plan_flight(mission, seed), [], [])
+    flown = Flight(plan_flight(mission, seed, policy=GeometricExpert.name), [], [])
     before = navigator.start(flown.plan.params)
 
     def keep(record: Record) -> None:

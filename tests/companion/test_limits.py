@@ -10,7 +10,7 @@ from point_mass import DOWN_M, PointMass
 from companion.core import geometry
 from companion.core.types import F64
 from companion.guidance import limits
-from companion.guidance.follower import FollowerParams, Target, follow
+from companion.guidance.follower import FollowerParams, Target, follow, progress
 from companion.guidance.limits import Ahead, LimitsParams
 
 PARAMS = LimitsParams()
@@ -146,7 +146,8 @@ def test_a_wall_across_the_path_is_approached_to_its_margin_and_not_nearer(cruis
         speed = limits.limit_rise(speed, state.vel_ned_m_s, np.array([1.0, 0.0]), PARAMS)
         assert vehicle.vel[0] <= limits.stopping_speed(free) + 0.1
         assert not limits.velocity_stop_needed(state.pos_ned_m, state.vel_ned_m_s, points, RADIUS_M - 0.06, PARAMS)
-        followed = follow(LINE, state, s_m, Target(speed, DOWN_M, 0.0), FollowerParams())
+        at = progress(LINE, state.pos_ned_m, s_m, FollowerParams())
+        followed = follow(LINE, state, at, Target(speed, DOWN_M, 0.0), FollowerParams())
         s_m = followed.s_m
         vehicle.tick(followed.setpoint)
         assert vehicle.pos[0] <= WALL_M - RADIUS_M - margin
