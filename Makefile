@@ -46,7 +46,7 @@ $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
 	$(BIN)/pip install -q -c constraints.txt -e '.[dev]'
 	@touch $@ $(VENV)/.sitl
 $(VENV)/.scale: $(VENV)/.dev
-	$(BIN)/pip install -q -c constraints.txt -e '.[dev,scale]'
+	$(BIN)/pip install -q -c constraints.txt -e '.[compare,dev,scale]'
 	@touch $@
 
 # The second client that the vehicle is tested with: MAVSDK 3.17.4 and 4.1 do not go into one environment.
