@@ -81,15 +81,15 @@ def train(
     title = f"{spec.world}, preset {spec.preset.name}, {asked}"
     with FleetView(title, quiet=json) as view:
         members = train_fleet(spec, folder, jobs or cores(), cluster, view.update)
-    report = run_report(spec, folder, members)
-    if json:
-        print_json(report)
+    troubles = [f"seed {member.seed}: {member.error}" for member in members if member.state == "failed"]
+    try:
+        report = run_report(spec, folder, members)
+    except OSError as error:  # the disk is full
+        troubles.append(f"the report: {error.strerror or error}")
     else:
-        _print(report)
-    failed = [member for member in members if member.state == "failed"]
-    if failed:
-        told = "; ".join(f"seed {member.seed}: {member.error}" for member in failed)
-        raise FlightError(f"{told}; 'swiftnav train --resume {folder}' goes on")
+        print_json(report) if json else _print(report)
+    if troubles:
+        raise FlightError(f"{'; '.join(troubles)}; 'swiftnav train --resume {folder}' goes on")
 
 
 def _print(report: dict[str, Any]) -> None:

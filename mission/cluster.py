@@ -12,14 +12,17 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 LOCAL = "local"  # ``--cluster local``: a Ray of its own on this machine
+AUTO = "auto"  # the cluster that this machine belongs to
 KNOCK_S = 5.0
 
 
 def check_address(address: str) -> None:
     """Ray itself tries for minutes: ``HOST:PORT`` and ``ray://HOST:PORT`` are knocked at. Raises InputError."""
+    if address in (LOCAL, AUTO):
+        return
     host, separator, port = address.removeprefix("ray://").rpartition(":")
     if not separator:
-        return
+        raise InputError(f"--cluster '{address}' wants HOST:PORT, ray://HOST:PORT, {AUTO} or {LOCAL}")
     try:
         socket.create_connection((host, int(port)), KNOCK_S).close()
     except (OSError, ValueError, OverflowError) as error:

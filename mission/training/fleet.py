@@ -122,6 +122,9 @@ def _work(job: Job, seed: int, folder: Path, pipe: "Connection[object, object]")
     except (InputError, FlightError, ParamError) as error:
         pipe.send(str(error))
         sys.exit(EXIT_FAILED)
+    except OSError as error:  # a disk that is full: nothing more can be said in a file
+        pipe.send(f"{error.filename or folder}: {error.strerror or error}")
+        sys.exit(EXIT_FAILED)
 
 
 def _heard(member: Member, pipe: "Connection[object, object]") -> Member:

@@ -25,6 +25,8 @@ BAD_INPUT = [
     ("train --until-successes 0", "--until-successes"),
     ("train --device cudda", "--device 'cudda'"),
     ("train --out full", "not empty"),
+    ("train --cluster nowhere", "--cluster 'nowhere' wants HOST:PORT"),
+    ("train --cluster 127.0.0.1:1", "--cluster '127.0.0.1:1': nobody answers there"),
     ("train --resume nowhere", "'nowhere' is no run folder"),
     ("train --resume full --world trajectory1", "--resume goes on with a run as it was begun: no --world beside it"),
     ("train --resume full --set td3.tau=0.1", "no --set beside it"),

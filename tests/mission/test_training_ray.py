@@ -11,7 +11,7 @@ pytest.importorskip("ray")
 
 from pendulum_kit import PendulumJob
 
-from mission.cluster import LOCAL
+from mission.cluster import LOCAL, check_address
 from mission.errors import InputError
 from mission.training.fleet import Member, run_fleet
 from mission.training.ray_fleet import read_files, run_ray_fleet, write_files
@@ -79,6 +79,12 @@ def test_a_cluster_that_is_not_there_is_told(tmp_path: Path) -> None:
     for address in ("127.0.0.1:1", "ray://127.0.0.1:1", "127.0.0.1:port"):
         with pytest.raises(InputError, match=f"--cluster '{address}': nobody answers"):
             run_ray_fleet(PendulumJob(1), [1], tmp_path, address, 1, _nobody)
+
+
+@pytest.mark.parametrize("address", ["nowhere", "ray://nowhere"])
+def test_an_address_without_a_port_is_told_what_it_wants(address: str) -> None:
+    with pytest.raises(InputError, match=f"--cluster '{address}' wants HOST:PORT, ray://HOST:PORT, auto or local"):
+        check_address(address)
 
 
 def _nobody(members: Sequence[Member]) -> None:
