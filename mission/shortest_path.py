@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from companion.core.types import F64
-from mission.world_check import CELL_M, clearance_grid, clearance_m
+from mission.world_check import CELL_M, clearance_grid, distances_m
 from sitl.world import World
 
 NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1))  # and their opposites
@@ -110,7 +110,8 @@ class _Grid:
 def straight_free(world: World, from_ned_m: F64, to_ned_m: F64, radius_m: float) -> bool:
     """Does a disc get straight from one place to the other?"""
     share = np.linspace(0.0, 1.0, max(2, math.ceil(math.dist(from_ned_m, to_ned_m) / CELL_M)))[1:-1, None]
-    return bool(np.all(clearance_m(world, from_ned_m + share * (to_ned_m - from_ned_m)) >= radius_m))
+    places = from_ned_m + share * (to_ned_m - from_ned_m)
+    return all((distance_m >= radius_m).all() for distance_m in distances_m(world, places))
 
 
 def _near(world: World, from_ned_m: F64, to_ned_m: F64) -> World:

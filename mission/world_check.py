@@ -4,7 +4,7 @@ The way is searched on a grid of exact clearances, so a refusal can say how wide
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +29,17 @@ class WorldError(InputError):
 def clearance_m(world: World, points_ned_m: F64) -> F64:
     """Distance (n,) from points (n, 2) to the nearest surface of what stands still; negative inside; inf if empty."""
     nearest = np.full(len(points_ned_m), np.inf)
-    for circle in world.circles:
-        np.minimum(nearest, _to_circle(circle, points_ned_m), out=nearest)
-    for box in world.boxes:
-        np.minimum(nearest, _to_box(box, points_ned_m), out=nearest)
+    for distance_m in distances_m(world, points_ned_m):
+        np.minimum(nearest, distance_m, out=nearest)
     return nearest
+
+
+def distances_m(world: World, points_ned_m: F64) -> Iterator[F64]:
+    """Distances (n,) from points (n, 2) to the surface of each thing that stands still, one after the other."""
+    for circle in world.circles:
+        yield _to_circle(circle, points_ned_m)
+    for box in world.boxes:
+        yield _to_box(box, points_ned_m)
 
 
 def check_world(world: World, radius_m: float = RADIUS_M, margin_m: float = MARGIN_M, cell_m: float = CELL_M) -> None:

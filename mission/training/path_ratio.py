@@ -35,14 +35,12 @@ def path_ratio(flight: Flight, known: bool) -> float | None:
 
 def shortest_from(world: World, began_ned_m: F64, radius_m: float) -> float:
     """Length of the shortest way from a place near the start to the goal; inf when there is none."""
-    return min((_joined_m(way, world, began_ned_m, radius_m) for way in _ways(world, radius_m)), default=math.inf)
-
-
-def _joined_m(way: tuple[F64, F64], world: World, began_ned_m: F64, radius_m: float) -> float:
-    """Straight to where the way is in free sight, and along it."""
-    places, left_m = way
+    ways = _ways(world, radius_m)
+    if not ways:
+        return math.inf
+    places, left_m = (np.concatenate(column) for column in zip(*ways, strict=True))
     total_m = np.hypot(*(places - began_ned_m).T) + left_m
-    for k in np.argsort(total_m, kind="stable").tolist():
+    for k in np.argsort(total_m, kind="stable").tolist():  # straight to where a way is in free sight, and along it
         if straight_free(world, began_ned_m, places[k], radius_m - TOUCH_M):
             return float(total_m[k])
     return math.inf
