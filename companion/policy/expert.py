@@ -31,6 +31,11 @@ class ExpertParams:
     comfort_m: float = param(1.3, "SN_EX_COMFORT", "Clearance beyond which a path costs only its length", "m", 0.1, 5.0)
     comfort_cost: float = param(4.0, "SN_EX_COMF_W", "Extra cost at the least clearance", "", 0.0, 50.0)
     unknown_cost: float = param(0.6, "SN_EX_UNKNOWN", "Extra cost of a cell never seen", "", 0.0, 50.0)
+    wall_m: float = param(
+        0.0, "SN_EX_WALL", "A cell never seen this near to a hit counts as more of it (0: not so)", "m", 0, 5
+    )
+    wall_cost: float = param(2.0, "SN_EX_WALL_COST", "Extra cost of such a cell", "", 0.0, 50.0)
+    wall_line_cost: float = param(0.5, "SN_EX_WALL_LINE", "The same for a metre off the line", "1/m", 0.0, 10.0)
     hard_range_m: float = param(6.0, "SN_EX_HARD", "Hits beyond this cost, but do not block", "m", 0.5, 40.0)
     far_cost: float = param(12.0, "SN_EX_FAR", "Extra cost of a far blocked cell", "", 0.0, 200.0)
     beyond_cost: float = param(1.0, "SN_EX_BEYOND", "Cost a metre of the way beyond the map to the goal", "", 1.0, 10.0)
@@ -111,7 +116,10 @@ def _field(query: Query, clearance_m: F64, hits: _Hits, hard_m: float, params: E
     cost *= params.comfort_cost * cost
     cost += 1.0
     grid = query.grid
-    cost += params.unknown_cost * ((grid.free_t <= NEVER) & (grid.hit_t <= NEVER))
+    unknown = (grid.free_t <= NEVER) & (grid.hit_t <= NEVER)
+    cost += params.unknown_cost * unknown
+    if params.wall_m > 0.0:
+        cost += _on_behind_the_wall(query, params) * (unknown & (clearance_m < params.wall_m))
     north, east = centres(grid)
     dn, de = north - query.state.pos_ned_m[0], east - query.state.pos_ned_m[1]
     square = (dn * dn)[:, None] + (de * de)[None, :]
@@ -127,6 +135,20 @@ def _field(query: Query, clearance_m: F64, hits: _Hits, hard_m: float, params: E
         cost += params.far_cost * (tight & near)
     cost[blocked] = BLOCKED
     return _Field(cost, clearance_m, hard_m, hits)
+
+
+def _on_behind_the_wall(query: Query, params: ExpertParams) -> F64:
+    """(n, n) extra cost of passing a wall beyond its seen end: at grazing angle an opening there would not show.
+
+    So an opening that was seen is taken first, and both ways along the wall are looked at, the nearer to the line from
+    start to goal first: what lies far off it on this side comes after what lies near on the other.
+    """
+    north, east = centres(query.grid)
+    way = query.goal_ne_m - query.start_ne_m
+    way = way / max(float(np.hypot(*way)), query.grid.cell_m)
+    right = way[0] * (east - query.start_ne_m[1])[None, :] - way[1] * (north - query.start_ne_m[0])[:, None]
+    cost: F64 = params.wall_cost + params.wall_line_cost * np.abs(right)
+    return cost
 
 
 def _plan(query: Query, field: _Field, old: F64 | None, params: ExpertParams) -> F64 | None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -40,6 +40,14 @@ LOQUERCIO: Final = Rules(
     range_m=6.0,
     rate_hz=1.0 / 0.068,
 )
+# What an opening of 0.8 m asks of a sphere of 0.2 m: cells finer than the room to spare, margins that fit in, no
+# corners cut; and where to look in a wall that shows none.
+NARROW: Final[dict[str, dict[str, Any]]] = {
+    "map": {"cell_m": 0.12},
+    "expert": {"margin_m": 0.10, "tight_m": 0.03, "wall_m": 3.0},
+    "follower": {"off_path_m": 0.05, "off_path_gain_1_m": 5.0, "off_path_share": 0.2},
+    "limits": {"corner_cut_m": 0.06},
+}
 YARD_RULES: Final = Rules(
     speed_m_s=2.0,
     radius_m=published_sets.YARD_RADIUS_M,
@@ -162,7 +170,7 @@ def _gap(_folder: Path | None, _part: str) -> Suite:
 
 def _gap_course(speed_m_s: float, run: int) -> Course:
     finish_m = 1.5 * published_sets.GAP_AHEAD_M
-    rules = replace(LOQUERCIO, speed_m_s=speed_m_s, finish_north_m=finish_m, time_limit_s=40.0)
+    rules = replace(LOQUERCIO, speed_m_s=speed_m_s, finish_north_m=finish_m, time_limit_s=40.0, params=NARROW)
     return _straight(f"{speed_m_s:g} m/s", published_sets.gap(FIRST_SEED + run), rules)
 
 

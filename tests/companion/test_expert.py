@@ -258,3 +258,30 @@ def test_chords_stay_near_the_path_that_they_cut() -> None:
     off = geometry.points_to_polyline_distance(path, flown)
     assert off.max() < 4 * ExpertParams().chord_m + 1e-9
     assert all(math.dist(a, b) > 0.05 for a, b in itertools.pairwise(path))
+
+
+def wall_seen(end_east_m: float, opening_east_m: float | None = None) -> GridMap:
+    """A wall 4 m north, seen from 4 m west up to an end; unseen beyond, and behind it except through an opening."""
+    hits = line((4.0, -4.0), (4.0, end_east_m))
+    if opening_east_m is not None:
+        hits = hits[np.abs(hits[:, 1] - opening_east_m) > 0.6]
+    grid = known(hits, seen=False)
+    north, east = gridmap.centres(grid)
+    grid.free_t[(north < 3.8)[:, None] & ((east > -4.0) & (east < end_east_m))[None, :]] = NOW_S
+    if opening_east_m is not None:
+        grid.free_t[(north < 8.0)[:, None] & (np.abs(east - opening_east_m) < 0.6)[None, :]] = NOW_S
+    return grid
+
+
+def crossing_m(grid: GridMap, pos: F64, params: ExpertParams) -> float:
+    """East of the place where the way passes the wall, or leaves the map before."""
+    _, path = GeometricExpert(params, MAP).propose(query(grid, pos, goal=np.array([60.0, 0.0])), None)
+    assert path is not None
+    beyond = np.flatnonzero(path[:, 0] > 4.0)
+    return float(path[beyond[0] if len(beyond) else -1, 1])
+
+
+def test_an_opening_that_was_seen_comes_before_the_unseen_end_of_a_wall() -> None:
+    grid, pos = wall_seen(6.0, opening_east_m=1.5), np.array([2.0, 6.0])
+    assert crossing_m(grid, pos, ExpertParams()) > 5.0
+    assert abs(crossing_m(grid, pos, ExpertParams(wall_m=3.0)) - 1.5) < 0.5
