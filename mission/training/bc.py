@@ -19,7 +19,7 @@ from companion.policy.decoder import ACTION_SIZE, DecoderParams, mirror_action
 from companion.policy.headings import headings_rad, mirror_logits
 from companion.policy.learned import HEADS
 from companion.policy.observations import mirror_observation
-from mission.training.networks import actor_net, as_numpy, from_numpy, single_thread
+from mission.training.networks import actor_net, as_numpy, single_thread
 
 F32 = NDArray[np.float32]
 
@@ -61,17 +61,16 @@ class Clone:
     agreement: float  # share of what was held out: the same or a neighbouring heading; or an action within 0.1
 
 
-def clone(data: Dataset, config: CloneConfig, seed: int, start: Actor | None = None) -> Clone:
+def clone(data: Dataset, config: CloneConfig, seed: int) -> Clone:
     """Train an actor on what a teacher said.
 
     Args:
         data: at least two rows.
         config: sizes and rates.
         seed: of weights, batches and what is held out; the same seed gives the same actor.
-        start: of another cloning to go on from, None for a new one.
 
     Raises:
-        ValueError: where labels and head do not fit, or ``start`` is of other sizes.
+        ValueError: where labels and head do not fit.
     """
     outputs = HEADS[config.head]
     if data.labels.shape != (len(data.observations), outputs):
@@ -80,8 +79,6 @@ def clone(data: Dataset, config: CloneConfig, seed: int, start: Actor | None = N
     single_thread()
     rng = np.random.default_rng(seed)
     net = actor_net(data.observations.shape[1], outputs, config.hidden, seed)
-    if start is not None:
-        from_numpy(net, start)
     net = net.to(config.device)
     order = rng.permutation(len(data.observations))
     judged, learned = np.split(order, [max(1, int(config.held_out * len(order)))])

@@ -81,15 +81,3 @@ def as_numpy(net: nn.Sequential) -> Actor:
         tuple(layer.weight.detach().cpu().numpy().copy() for layer in layers),
         tuple(layer.bias.detach().cpu().numpy().copy() for layer in layers),
     )
-
-
-def from_numpy(net: nn.Sequential, actor: Actor) -> None:
-    """Give an actor the weights of one that flies. Raises ValueError where the shapes differ."""
-    layers = [module for module in net if isinstance(module, nn.Linear)]
-    sizes = (layers[0].in_features, *(layer.out_features for layer in layers))
-    if actor.sizes() != sizes:
-        raise ValueError(f"an actor of sizes {actor.sizes()} does not fit a net of {sizes}")
-    with torch.no_grad():
-        for layer, weight, bias in zip(layers, actor.weights, actor.biases, strict=True):
-            layer.weight.copy_(torch.from_numpy(weight.copy()))
-            layer.bias.copy_(torch.from_numpy(bias.copy()))

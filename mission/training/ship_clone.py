@@ -1,4 +1,4 @@
-"""How does a clone become a policy that ships? Flown in every kind of world, guard off and on, beside its teacher.
+"""How does what was learned in random worlds ship? Flown in every kind of them, guard off and on, beside the expert.
 
 Every flight is kept in the run's folder as soon as it is over: a shipment that was cut off goes on where it was. The
 same command writes the same figures again, wall times aside.
@@ -16,9 +16,10 @@ from companion.policy.store import POLICIES, read_policy, save_policy
 from mission.bench.run import commit
 from mission.errors import FlightError, InputError
 from mission.flight_log import read_rows
-from mission.training.dagger_config import read_config
+from mission.training.dagger_config import FILE, read_config
 from mission.training.evaluate import EvalSpec, fly_one
 from mission.training.scores import FlightFigures
+from mission.training.seed_job import POLICY_FOLDER
 from mission.training.ship import figures_of
 
 FLOWN = "shipping.jsonl"
@@ -28,18 +29,20 @@ WORLDS = (
 LIMITS = (
     "Trained and tested at 3 m/s cruise, 72 sectors of 5 deg, standing obstacles, winds up to 6 m/s; nothing else.",
     "Alone (guard off) it may circle in front of what it cannot pass until the time is over; the guard ends that.",
-    "Its paths are straight legs of 4 m and pass obstacles nearer than the expert's: alone it flies slower than that.",
+    "Alone it flies slower than the expert.",
 )
+GUARD_OFF = "guard_off"
 
 
 @dataclass(frozen=True, slots=True)
 class CloneShipment:
-    """Which clone, under which name, flown where and how often."""
+    """Which policy, under which name, flown where and how often."""
 
-    run: Path
+    run: Path  # of ``swiftnav clone``, or a seed's folder of ``swiftnav train``
     name: str
     worlds: tuple[str, ...] = WORLDS
-    flights: int = 20  # in each world, guard off, on, and the expert
+    flights: int = 20  # in each kind, guard off
+    beside: int = 20  # guard on, and the expert
     seed: int = 100  # number of the first test world
     into: Path = POLICIES
 
@@ -49,10 +52,7 @@ def ship_clone(shipment: CloneShipment, tell: Callable[[int, int], None]) -> dic
 
     ``tell`` hears how many flights are over, of how many. Raises InputError or FlightError.
     """
-    config = read_config(shipment.run)
-    folder = shipment.run / f"round-{config.rounds - 1}"
-    if not folder.is_dir():
-        raise InputError(f"{folder}: not there: 'swiftnav clone --resume {shipment.run}' ends the training")
+    folder = _learned(shipment.run)
     card, actor = read_policy(folder)
     evaluation = _evaluation(shipment, str(folder), tell)
     training = {**card.training, "commit": commit()}
@@ -69,17 +69,30 @@ def ship_clone(shipment: CloneShipment, tell: Callable[[int, int], None]) -> dic
 def arms(policy: str, world: str) -> dict[str, EvalSpec]:
     """What is flown in a world, by name."""
     return {
-        "guard_off": EvalSpec(policy, world),
+        GUARD_OFF: EvalSpec(policy, world),
         "guard_on": EvalSpec(policy, world, guard=True),
         GeometricExpert.name: EvalSpec(GeometricExpert.name, world),
     }
 
 
+def _learned(run: Path) -> Path:
+    """The folder of the policy."""
+    if (run / POLICY_FOLDER).is_dir() and not (run / FILE).is_file():
+        return run / POLICY_FOLDER
+    folder = run / f"round-{read_config(run).rounds - 1}"
+    if not folder.is_dir():
+        raise InputError(f"{folder}: not there: 'swiftnav clone --resume {run}' ends the training")
+    return folder
+
+
 def _evaluation(shipment: CloneShipment, policy: str, tell: Callable[[int, int], None]) -> dict[str, Any]:
     log = shipment.run / FLOWN
     known = {_key(row): _figures(row["figures"]) for row in read_rows(log)}
-    seeds = range(shipment.seed, shipment.seed + shipment.flights)
-    planned = [(world, arm, seed) for seed in seeds for world in shipment.worlds for arm in arms(policy, world)]
+    seeds = {
+        arm: range(shipment.seed, shipment.seed + (shipment.flights if arm == GUARD_OFF else shipment.beside))
+        for arm in arms(policy, "")
+    }
+    planned = [(world, arm, seed) for arm in seeds for seed in seeds[arm] for world in shipment.worlds]
     with log.open("a", encoding="utf-8") as file:
         for count, key in enumerate(planned):
             tell(count, len(planned))
@@ -91,8 +104,7 @@ def _evaluation(shipment: CloneShipment, policy: str, tell: Callable[[int, int],
             file.write(json.dumps(row) + "\n")
             file.flush()
     return {
-        world: {arm: figures_of(_flights(known, world, arm, seeds)) for arm in arms(policy, world)}
-        for world in shipment.worlds
+        world: {arm: figures_of(_flights(known, world, arm, seeds[arm])) for arm in seeds} for world in shipment.worlds
     }
 
 

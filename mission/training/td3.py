@@ -18,7 +18,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from companion.policy.actor import Actor
-from mission.training.networks import TwinCritic, actor_net, as_numpy, from_numpy, single_thread
+from mission.training.networks import TwinCritic, actor_net, as_numpy, single_thread
 from mission.training.replay import Batch
 
 F32 = NDArray[np.float32]
@@ -91,11 +91,6 @@ class TD3:
     def actor(self) -> Actor:
         """A copy of the actor that flies without torch."""
         return as_numpy(self._actor)
-
-    def start_from(self, actor: Actor) -> None:
-        """Begin with the actor of another training, as a clone of a teacher. Raises ValueError if it does not fit."""
-        from_numpy(self._actor, actor)
-        from_numpy(self._actor_target, actor)
 
     def update(self, batch: Batch) -> dict[str, Any]:
         """One update.

@@ -37,16 +37,25 @@ def test_a_card_tells_every_world_guard_off_and_on_beside_the_expert(
 ) -> None:
     flown: list[tuple[EvalSpec, int]] = []
     monkeypatch.setattr(module, "fly_one", lambda spec, seed: flown.append((spec, seed)) or flight(spec, seed))
-    shipment = CloneShipment(run, "forest", ("barrier", "pocket"), 2, 7, tmp_path / "policies")
+    shipment = CloneShipment(run, "forest", ("barrier", "pocket"), 2, 1, 7, tmp_path / "policies")
     first = ship_clone(shipment, lambda count, planned: None)
-    assert len(flown) == 12
+    assert len(flown) == 8
     assert {seed for _, seed in flown} == {7, 8}
     assert ship_clone(shipment, lambda count, planned: None) == first
-    assert len(flown) == 12
+    assert len(flown) == 8
     card, _ = read_policy(tmp_path / "policies" / "forest")
     assert card.evaluation["pocket"]["guard_on"]["success"] == 1.0
     assert card.evaluation["pocket"]["guard_off"]["success"] == 0.0
     assert card.limits
+
+
+def test_a_seed_that_was_trained_ships_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = CONFIG.policy_spec()
+    save_policy(tmp_path / "seed_2" / "policy", as_numpy(actor_net(50, 41, (8,), 1)), Card("x", spec, {"seed": 2}))
+    monkeypatch.setattr(module, "fly_one", flight)
+    ship_clone(CloneShipment(tmp_path / "seed_2", "forest", ("deep",), 1, 1, 7, tmp_path / "out"), lambda *_: None)
+    card, _ = read_policy(tmp_path / "out" / "forest")
+    assert card.training["seed"] == 2
 
 
 def test_a_run_that_is_not_over_does_not_ship(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from companion.policy.observations import SIZES, mirror_observation
 from companion.policy.store import Card, save_policy
 from mission.training import bc, export
 from mission.training.mirror import half_mirrored
-from mission.training.networks import TwinCritic, actor_net, as_numpy, from_numpy
+from mission.training.networks import TwinCritic, actor_net, as_numpy
 from mission.training.replay import Batch, Replay, ReplayConfig
 from mission.training.td3 import TD3, TD3Config
 
@@ -46,14 +46,6 @@ def test_the_actor_says_the_same_in_numpy_as_in_torch() -> None:
     assert np.abs(squashed(as_numpy(net).forward(obs)) - expected).max() < 1e-6
     one_by_one = np.array([as_numpy(net).forward(row) for row in obs[:20]])
     assert np.abs(np.tanh(one_by_one) - expected[:20]).max() < 1e-6
-
-
-def test_weights_travel_from_torch_to_numpy_and_back() -> None:
-    one, other = actor_net(5, 3, (8,), seed=1), actor_net(5, 3, (8,), seed=2)
-    from_numpy(other, as_numpy(one))
-    assert all(torch.equal(a, b) for a, b in zip(one.parameters(), other.parameters(), strict=True))
-    with pytest.raises(ValueError, match="does not fit"):
-        from_numpy(actor_net(5, 3, (9,), seed=1), as_numpy(one))
 
 
 def test_two_critics_in_one_are_two_critics() -> None:
@@ -254,8 +246,6 @@ def test_a_ranking_is_cloned_and_knows_left_from_right() -> None:
     assert got.agreement > 0.8
     again = bc.clone(data, config, seed=0)
     assert all((a == b).all() for a, b in zip(got.actor.weights, again.actor.weights, strict=True))
-    further = bc.clone(data, config, seed=1, start=got.actor)
-    assert further.loss < got.loss + 0.05
 
 
 def test_actions_are_cloned_as_far_as_the_decoder_reads_them() -> None:
@@ -288,7 +278,5 @@ def test_a_trained_actor_can_be_shipped(tmp_path: Path) -> None:
     learner = TD3(SIZES["goal"], ACTION_SIZE, TD3Config(hidden=(16,)), seed=0)
     save_policy(tmp_path / "t", learner.actor(), Card("t", PolicySpec("goal"), {"seed": 0}))
     card, loaded = store.read_policy(tmp_path / "t")
-    other = TD3(SIZES["goal"], ACTION_SIZE, TD3Config(hidden=(16,), zero_last=False), seed=5)
-    other.start_from(loaded)
     assert card.training == {"seed": 0}
-    assert isinstance(loaded, Actor) and (other.act(np.ones(72, np.float32)) == 0.0).all()
+    assert isinstance(loaded, Actor) and (loaded.forward(np.ones(72)) == 0.0).all()
