@@ -44,8 +44,8 @@ METHOD = """## How it was done
   the time by which the way left gets shorter, on the true map, which the policy does not see.
 - No arm is tuned. An arm differs from its preset by what its row says; seeds, worlds, draws and greedy flights are
   the same in every arm.
-- Every arm trains until 100 successes or its limit of episodes: 300, but 200 with the settings as printed on
-  Trajectory 1, and 140 where an arm is set beside Trajectory 2. After it each seed flies greedily, in the arm's own
+- Every arm trains until 100 successes or its limit of episodes: 300, but 200 with the settings as printed and
+  in other worlds, and 100 where an arm is set beside Trajectory 2. After it each seed flies greedily, in the arm's own
   environment. Future work gets three seeds. What was not run, or not to its end, is not in the tables; `seeds` says
   how many were finished.
 - A seed of the baseline ends with the ticks that the same seed of SWIFT-Nav used. With one update a decision it learns

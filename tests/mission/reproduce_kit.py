@@ -164,7 +164,7 @@ AS_TOLD: dict[str, list[Figures]] = {  # by the paper
     "no_stability": [NO_STABILITY] * 5,
     "no_checker": [NO_CHECKER] * 5,
     "replay_per": [SWIFT] * 5,
-    "replay_uniform": [SWIFT | {"episodes": 180.0}] * 5,
+    "replay_uniform": [SWIFT | {"successes_first100": 70.0}] * 5,
     "world_forest": [SWIFT] * 5,
     "vanilla_forest": [VANILLA] * 5,
 }

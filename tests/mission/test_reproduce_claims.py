@@ -47,7 +47,7 @@ def test_one_seed_has_no_interval_to_lie_apart() -> None:
     claim = next(claim for claim in CLAIMS if claim.name == "per_quicker")
     outcome = judge_all([claim], alone)[0]
     assert outcome.verdict is Verdict.NOT_MEASURED
-    assert outcome.measured == "too little was flown to tell the interval of episodes over seeds"
+    assert outcome.measured == "too little was flown to tell the interval of successes_first100 over seeds"
     assert outcome.seeds == "replay_per 1, replay_uniform 1"
 
 
