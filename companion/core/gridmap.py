@@ -60,6 +60,16 @@ class PolarScan:
 
 
 @dataclass(frozen=True, slots=True)
+class Lately:
+    """What the last scans showed; the map only keeps it (``perception.noise``)."""
+
+    sigma_m: float  # of a ray
+    scan: PolarScan  # the last, as it came
+    pos_ne_m: F64  # (h, 2) of the last few, newest first
+    free_m: F64  # (h, AZIMUTH_BINS) how far each of them looked
+
+
+@dataclass(frozen=True, slots=True)
 class GridMap:
     """Square of cells; index [0, 0] is the south-west corner, first axis north, second east."""
 
@@ -69,6 +79,7 @@ class GridMap:
     hit_t: F32  # (n, n) when last hit, NEVER if free since
     hit_ne_m: F32  # (n, n, 2) the hit itself, finer than the cell
     moved_ne_m: F64  # (m, 2) middle of each arc of the last scan that lies, to a cell's depth, in space free lately
+    lately: Lately | None = None  # where range noise is reckoned with
 
 
 def empty(params: MapParams) -> GridMap:

@@ -12,6 +12,7 @@ from companion.core.inputs import Inputs
 from companion.core.params import param
 from companion.core.types import F64, VehicleState
 from companion.perception.movers import MoverParams, Track, avoidable, discs, follow, hazards
+from companion.perception.noise import entered
 from companion.perception.observation import nearest_representatives
 from companion.perception.polar import BEARING_RAD, flatten
 from companion.perception.score import local_density, safety_score
@@ -35,6 +36,12 @@ class PerceptionParams:
     density_tight: float = param(0.80, "SN_PC_DENS_HI", "Density from which the scale is least", "", 0.0, 1.0)
     scale_min: float = param(
         0.5, "SN_PC_SCALE", "Least scale of thresholds and membership (1: schedule off)", "", 0.1, 1
+    )
+    unbias: float = param(
+        0.0, "SN_PC_UNBIAS", "Sector minima are taken back by so many sigma of a ray, as scans show it", "", 0.0, 2.0
+    )
+    refute: float = param(
+        0.0, "SN_PC_REFUTE", "A hit that a scan looks past by so many sigma is dropped (0: with its cell)", "", 0, 10
     )
 
 
@@ -77,7 +84,10 @@ def perceive(
     """Digest one scan."""
     state, pos_ne_m = inputs.state, inputs.state.pos_ned_m[:2]
     flat = flatten(inputs.scan, state, params.lidar_up_m + before.ground_down_m, params.ground_margin_m)
-    grid = update(before.grid, flat.polar, map_params)
+    if params.unbias > 0.0 or params.refute > 0.0:
+        grid = entered(before.grid, flat.polar, params.unbias, params.refute, map_params)
+    else:
+        grid = update(before.grid, flat.polar, map_params)
     tracks = follow(before.tracks, grid.moved_ne_m, pos_ne_m, state.t_s, state.t_s - before.t_s, mover_params)
     static, swept = occupied_points(grid, state.t_s, map_params), hazards(tracks, mover_params)
     points = static
