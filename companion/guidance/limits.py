@@ -47,6 +47,18 @@ class LimitsParams:
     )
     stop_margin_m: float = param(0.06, "LIM_STOP_MARGIN", "widening of the hull for the stop rule", "m", 0.0, 0.5)
     hold_from_m_s: float = param(3.0, "LIM_HOLD_FROM", "from here up hold at once, below ramp down", "m/s", 0.0, 20.0)
+    clamp: bool = param(True, "LIM_CLAMP", "speed is bounded by what stops within the free length ahead")
+    swerve_m_s2: float = param(
+        0.0,
+        "LIM_SWERVE",
+        "sideways acceleration with which what a stop is due for is passed (0: stop)",
+        "m/s2",
+        0.0,
+        7.0,
+    )
+    swerve_lag_s: float = param(
+        0.2, "LIM_SWERVE_LAG", "scan age, link, tick and tilt lag before it bites", "s", 0.0, 1.0
+    )
     ramp_m_s2: float = param(4.0, "LIM_RAMP", "deceleration of the ramp into a hold", "m/s2", 0.5, 6.0)
 
 
@@ -102,6 +114,8 @@ def corridor_speed(d_free_m: float, params: LimitsParams) -> float:
 
     The first alone, followed along as the free length shrinks, overruns by a vehicle's lag (0.2 m measured).
     """
+    if not params.clamp:
+        return math.inf
     return min(stopping_speed(d_free_m, params.decel_m_s2, params.tau_s), end_speed(d_free_m, params))
 
 

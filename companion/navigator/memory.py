@@ -9,6 +9,7 @@ from companion.core.types import F64, VehicleState
 from companion.guidance.landing import LandingState
 from companion.guidance.limits import HoldMemory
 from companion.guidance.line import GuidanceLine
+from companion.guidance.swerve import Swerve
 from companion.navigator.params import Params
 from companion.perception.movers import Track
 
@@ -40,6 +41,7 @@ class Engagement:
     tried_t_s: float  # last decision, accepted or not
     landing: LandingState | None
     stop: HoldMemory | None  # while braking or holding
+    swerve: Swerve | None = None  # the last one
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from companion.arbiter.facts import Facts, Thresholds, landing_safe
 from companion.core import geometry
 from companion.core.task import Task
 from companion.core.types import NavMode, Setpoint, VehicleState
-from companion.guidance import landing, limits, line
+from companion.guidance import landing, limits, line, swerve
 from companion.navigator.decide import Answer, Decision, Judge, settle
 from companion.navigator.memory import Engagement, Memory, Path
 from companion.navigator.params import Params
@@ -72,7 +72,9 @@ def _held(memory: Memory, engaged: Engagement, scene: Scene) -> Steered:
 def _travel(memory: Memory, engaged: Engagement, scene: Scene) -> Steered:
     """Along the frozen line, course corrected by the line law."""
     if _must_stop(scene):
-        return _held(memory, engaged, scene)
+        return _swerved(memory, engaged, scene, engaged.line.course_rad) or _held(memory, engaged, scene)
+    if engaged.swerve is not None and swerve.past(engaged.swerve, scene.state):
+        return _swerving(memory, engaged, scene, engaged.swerve, False)
     state, params = scene.state, scene.params
     vertices = np.stack([engaged.line.origin_ned_m, engaged.line.goal_ned_m])
     speed = math.hypot(state.vel_ned_m_s[0], state.vel_ned_m_s[1])
@@ -93,8 +95,9 @@ def _follow(memory: Memory, engaged: Engagement, scene: Scene, asked: Asked | No
         )
     path, params = engaged.path, scene.params
     if path is None or _must_stop(scene, _stop_margin(path, scene.params)):
-        held = _held(memory, replace(engaged, path=None), scene)
-        return replace(held, decision=decision)
+        planned_rad = None if path is None else course_along(path.vertices_ne_m, path.s_m)
+        swerved = _swerved(memory, engaged, scene, planned_rad) if _must_stop(scene) else None
+        return replace(swerved or _held(memory, replace(engaged, path=None), scene), decision=decision)
     margin_m = min(params.vehicle.corridor_m, path.margin_m)
     vertices = geometry.extended(path.vertices_ne_m, path.run_out_m)
     route = Route(vertices, path.s_m, scene.task.cruise_m_s, engaged.down_m, margin_m)
@@ -121,6 +124,19 @@ def _land(memory: Memory, engaged: Engagement, scene: Scene) -> Steered:
 def _stop_margin(path: Path, params: Params) -> float:
     """What the stop rule adds to the hull: a path with a run-out meets the next at full speed, and leaves it."""
     return params.policy.learned_stop_margin_m if path.run_out_m > 0.0 else 0.0
+
+
+def _swerved(memory: Memory, engaged: Engagement, scene: Scene, planned_rad: float | None) -> Steered | None:
+    """Past what a stop is due for, where the parameters allow it and a side is free; None: stop."""
+    state, params = scene.state, scene.params
+    points, radius_m = scene.percept.points_ne_m, params.vehicle.radius_m
+    begun = swerve.turn_aside(engaged.swerve, state, points, radius_m, planned_rad, params.limits)
+    return None if begun is None else _swerving(memory, replace(engaged, swerve=begun), scene, begun, True)
+
+
+def _swerving(memory: Memory, engaged: Engagement, scene: Scene, begun: swerve.Swerve, turning: bool) -> Steered:
+    asked = swerve.setpoint(begun, scene.state, turning, engaged.down_m, memory.yaw_sp_rad, scene.params.limits)
+    return Steered(memory, replace(engaged, stop=None), asked)
 
 
 def _must_stop(scene: Scene, margin_m: float = 0.0) -> bool:

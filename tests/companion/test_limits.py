@@ -187,3 +187,7 @@ def test_a_hold_ends_at_rest_where_its_setpoint_says(speed_m_s: float) -> None:
     assert vehicle.pos == pytest.approx(setpoint.pos_ned_m[:2], abs=0.05)
     at_once = speed_m_s >= PARAMS.hold_from_m_s or speed_m_s == 0.0
     assert setpoint.pos_ned_m[0] == pytest.approx(0.0 if at_once else speed_m_s**2 / (2.0 * PARAMS.ramp_m_s2))
+
+
+def test_with_the_clamp_off_the_free_length_bounds_no_speed() -> None:
+    assert limits.corridor_speed(0.5, dataclasses.replace(PARAMS, clamp=False)) == math.inf
