@@ -1,6 +1,6 @@
 """By which rule is each claim of the paper tested?  One function a claim: does it hold, and the figures for people."""
 
-from mission.reproduce.claims import Measured, Seeds, UnmeasuredError, agree, mean, told, value
+from mission.reproduce.claims import Measured, Seeds, UnmeasuredError, agree, decimals, mean, told, value
 from mission.reproduce.measures import Figures, interval_of
 
 TEN_THOUSAND = (3162.0, 31623.0)  # what rounds to ten to the fourth
@@ -67,7 +67,7 @@ def joint_trend(seeds: Seeds) -> Measured:
 def return_rises(seeds: Seeds) -> Measured:
     """By ten to the fourth."""
     rise = mean(seeds, "return_last") - mean(seeds, "return_first")
-    return TEN_THOUSAND[0] <= rise < TEN_THOUSAND[1], f"{_change(seeds, 'return')}, a rise of {rise:.0f}"
+    return TEN_THOUSAND[0] <= rise < TEN_THOUSAND[1], f"{_change(seeds, 'return')}, a rise of {rise:.{decimals(rise)}f}"
 
 
 def steps_fall(seeds: Seeds) -> Measured:
@@ -80,7 +80,8 @@ def steps_fall(seeds: Seeds) -> Measured:
 def ripples_fade(seeds: Seeds) -> Measured:
     """Late against middle."""
     fade = mean(seeds, "return_wobble_late") < mean(seeds, "return_wobble_mid")
-    ripples = f"{told(seeds, 'return_wobble_mid', 0)} in the middle third, {told(seeds, 'return_wobble_late', 0)} late"
+    mid, late = told(seeds, "return_wobble_mid", None), told(seeds, "return_wobble_late", None)
+    ripples = f"{mid} in the middle third, {late} late"
     return fade, f"wobble of the smooth return {ripples}"
 
 
@@ -100,7 +101,7 @@ def return_declines(without: Seeds, full: Seeds) -> Measured:
     """Downward with large oscillations."""
     down = agree(without, lambda s: value(s, "return_last") < value(s, "return_first"))
     wobbles = mean(without, "return_wobble") > mean(full, "return_wobble")
-    wobble = f"wobble {told(without, 'return_wobble', 0)} against {told(full, 'return_wobble', 0)}"
+    wobble = f"wobble {told(without, 'return_wobble', None)} against {told(full, 'return_wobble', None)}"
     return down and wobbles, f"{_change(without, 'return')}; {wobble}"
 
 
@@ -176,12 +177,14 @@ def _gain(seeds: Seeds, name: str) -> float:
 
 
 def _change(seeds: Seeds, name: str) -> str:
-    return f"{name} {told(seeds, f'{name}_first', 0)} -> {told(seeds, f'{name}_last', 0)}"
+    return f"{name} {told(seeds, f'{name}_first', None)} -> {told(seeds, f'{name}_last', None)}"
 
 
 def _spreads(seeds: Seeds) -> str:
     pairs = [(name, mean(seeds, f"{name}_sd_first"), mean(seeds, f"{name}_sd_last")) for name in ("steps", "return")]
-    return ", ".join(f"sd of {name} {first:.0f} -> {last:.0f}" for name, first, last in pairs)
+    return ", ".join(
+        f"sd of {name} {first:.{decimals(first)}f} -> {last:.{decimals(last)}f}" for name, first, last in pairs
+    )
 
 
 def _lower(seeds: Seeds, name: str) -> float:

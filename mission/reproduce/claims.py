@@ -77,15 +77,22 @@ def mean(seeds: Seeds, name: str) -> float:
     return interval.mean
 
 
-def told(seeds: Seeds, name: str, digits: int = 2) -> str:
-    """Mean and interval for people."""
+def told(seeds: Seeds, name: str, digits: int | None = 2) -> str:
+    """Mean and interval for people; ``digits`` None: as many decimals as make sense, two at most."""
     interval = interval_of(seeds, name)
     if interval is None:
         return "-"
+    if digits is None:
+        digits = decimals(interval.mean)
     text = f"{interval.mean:.{digits}f}"
     if interval.low is None or interval.high is None:
         return text
     return f"{text} [{interval.low:.{digits}f}, {interval.high:.{digits}f}]"
+
+
+def decimals(value: float) -> int:
+    """Of a number of unknown size: three digits in all, or the whole number."""
+    return 0 if abs(value) >= 100.0 else 1 if abs(value) >= 10.0 else 2
 
 
 def _judge(claim: Claim, settings: str, names: tuple[str, ...], arms: Mapping[str, Seeds]) -> Outcome:

@@ -123,8 +123,10 @@ def _stamp(found: Findings) -> str:
 def _claims(found: Findings) -> str:
     counts = ", ".join(f"{name}: {count}" for name, count in found.counts().items())
     lines = [_claim_line(outcome) for outcome in found.outcomes]
+    note = "A verdict on one seed is an observation; the paper itself flew one."
+    intro = f"{len(lines)} claims and settings. {counts[:1].upper()}{counts[1:]}. {note}"
     head = ["paper claim", "where", "settings", "measured here", "seeds", "holds?"]
-    return f"## Claims of the paper\n\n{len(lines)} judged. {counts[:1].upper()}{counts[1:]}.\n\n{_table(head, lines)}"
+    return f"## Claims of the paper\n\n{intro}\n\n{_table(head, lines)}"
 
 
 def _claim_line(outcome: Outcome) -> list[str]:

@@ -1,11 +1,11 @@
 """What do the paper's figures look like here?  PNG files from the rows of the arms, small enough for a repository.
 
 Curves are 15-episode moving averages: mean over the seeds that are still training while at least half are, band: 95 %
-interval of that mean (Student's t), thin lines: each seed.
+interval of that mean (Student's t) where at least three are, thin lines: each seed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ THIRD_COLOUR = "#8a63d2"
 DPI = 90
 SMALL = {"optimize": True}
 PANEL_INCH = (4.4, 2.9)
+BAND_SEEDS = 3  # of two the interval is wider than the picture
 SHOWN_TRACKS = 10  # of each, over a world
 
 Arm = Sequence[SeedRows]
@@ -48,6 +49,7 @@ def band(seeds: Arm, key: str, window: int = WINDOW) -> Band:
     shown = lengths[(len(lengths) + 1) // 2 - 1] if lengths else 0
     intervals = [over_seeds([float(values[k]) for values in smooth if k < len(values)]) for k in range(shown)]
     known = [interval for interval in intervals if interval is not None]
+    known = [i if i.seeds >= BAND_SEEDS else replace(i, low=None, high=None) for i in known]
     mean, low, high = (np.array([pick(interval) for interval in known]) for pick in (lambda i: i.mean, _low, _high))
     return Band(np.arange(1.0, len(known) + 1), mean, low, high, smooth)
 
@@ -120,7 +122,7 @@ def draw_episodes(world: World, arms: Sequence[tuple[str, SeedRows]], picture: P
             ax.plot(track[:, 1], track[:, 0], color=colour, lw=1.5, zorder=4, label=f"episode {episode}")
         ax.set_title(title, color=INK, fontsize=10, loc="left")
         if shown:
-            ax.legend(frameon=True, framealpha=0.85, edgecolor="none", fontsize=7, loc="lower right")
+            ax.legend(frameon=False, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.1), ncol=2)
     figure.savefig(picture, dpi=DPI, pil_kwargs=SMALL)
 
 
