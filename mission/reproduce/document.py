@@ -63,6 +63,7 @@ ARM_COLUMNS = (
     ("switches", "switches", 1),
     ("episodes beyond the bound", "above_bound", 1),
     ("path ratio, last 50", "path_ratio_last50", 2),
+    ("contact", "contact", 2),
     ("greedy success", "greedy_success", 2),
     ("greedy contact", "greedy_contact", 2),
     ("greedy path ratio", "greedy_path_ratio", 2),
@@ -97,7 +98,7 @@ def text_of(found: Findings, pictures: Sequence[tuple[Picture, str]], again: str
     """The whole document; ``pictures`` with their links, ``again``: the command that makes it once more."""
     parts = [HEAD, QUICK if found.quick else "", _stamp(found), f"```sh\n{again}\n```\n", _claims(found)]
     parts += [f"## {p.title}\n\n![{p.title}]({link})\n\n{p.text}\n" for p, link in pictures]
-    parts += ["## Arms\n", *(_group(group, found) for group in GROUPS), METHOD, _rules()]
+    parts += ["## Arms\n", *(_group(group, found) for group in GROUPS), _not_run(found), METHOD, _rules()]
     return "\n".join(part for part in parts if part)
 
 
@@ -149,6 +150,11 @@ def _group(group: str, found: Findings) -> str:
         return ""
     head = ["arm", "what", "preset, differs by", "seeds", *(label for label, _, _ in ARM_COLUMNS)]
     return f"### {TITLES[group]}\n\n{_table(head, [_arm_line(arm) for arm in arms])}{_idle(arms)}"
+
+
+def _not_run(found: Findings) -> str:
+    names = ", ".join(f"`{name}`" for name in found.not_run)
+    return f"Not run: {names}.\n" if names else ""
 
 
 def _idle(arms: Sequence[ArmFindings]) -> str:

@@ -42,6 +42,7 @@ class Findings:
     quick: bool
     arms: dict[str, ArmFindings]
     outcomes: list[Outcome]
+    not_run: list[str]  # arms of the table of which nothing is there
 
     def counts(self) -> dict[str, int]:
         """How many claims have which verdict."""
@@ -52,6 +53,7 @@ class Findings:
         return {
             "quick": self.quick,
             "arms": {name: _arm_dict(found) for name, found in self.arms.items()},
+            "not_run": self.not_run,
             "claims": [_outcome_dict(outcome) for outcome in self.outcomes],
             "verdicts": self.counts(),
         }
@@ -66,7 +68,7 @@ def findings(out: Path, table: Table) -> Findings:
             replace(outcome, measured=QUICK.format(outcome.measured), verdict=Verdict.NOT_MEASURED)
             for outcome in outcomes
         ]
-    return Findings(table.quick, arms, outcomes)
+    return Findings(table.quick, arms, outcomes, [arm.name for arm in table.arms if arm.name not in arms])
 
 
 def _read(out: Path, arm: Arm) -> ArmFindings:

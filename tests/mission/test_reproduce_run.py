@@ -155,6 +155,7 @@ def test_the_document_has_every_claim_every_begun_arm_and_its_pictures(reproduce
     for name in ("t1", "t2", "vanilla", "no_stability", "replay_per", "replay_uniform"):
         assert f"| `{name}` |" in text
     assert "| `t1_paper` |" not in text
+    assert "Not run: `no_checker`, `t1_paper`" in text
     assert len(pictures) == 6
     for picture in pictures:
         assert f"(figures/{picture.path.name})" in text
