@@ -25,8 +25,6 @@ BAD_INPUT = [
     ("train --until-successes 0", "--until-successes"),
     ("train --device cudda", "--device 'cudda'"),
     ("train --out full", "not empty"),
-    ("train --cluster nowhere", "--cluster 'nowhere' wants HOST:PORT"),
-    ("train --cluster 127.0.0.1:1", "--cluster '127.0.0.1:1': nobody answers there"),
     ("train --resume nowhere", "'nowhere' is no run folder"),
     ("train --resume full --world trajectory1", "--resume goes on with a run as it was begun: no --world beside it"),
     ("train --resume full --set td3.tau=0.1", "no --set beside it"),
@@ -49,6 +47,12 @@ EVALUATED = [
 TINY = "--set training.evaluate_every=0 --set td3.hidden=[8,8] --set env.time_limit_s=8"
 
 
+BAD_CLUSTER = [
+    ("nowhere", "--cluster 'nowhere' wants HOST:PORT"),
+    ("127.0.0.1:1", "--cluster '127.0.0.1:1': nobody answers there"),
+]
+
+
 @pytest.fixture
 def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with a few files in it."""
@@ -57,6 +61,15 @@ def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "full" / "something").touch()
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.mark.parametrize(("address", "expected"), BAD_CLUSTER)
+@pytest.mark.parametrize("command", ["train", "bench pole"])
+def test_a_cluster_that_cannot_be_reached_is_one_clear_line_and_leaves_nothing_behind(
+    command: str, address: str, expected: str, desk: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("ray")
+    test_bad_input_is_one_clear_line_and_leaves_nothing_behind(f"{command} --cluster {address}", expected, desk, capfd)
 
 
 @pytest.mark.parametrize(("words", "expected"), BAD_INPUT)
