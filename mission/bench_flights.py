@@ -30,11 +30,12 @@ class Flown(NamedTuple):
     flight_wall_s: float
 
 
-def fly_once(mission: str, seed: int) -> Flown:
+def fly_once(mission: str, seed: int, policy: str) -> Flown:
     """``swiftnav fly``. Raises InputError when no ports are free, FlightError when the flight did not end well."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        arguments = ["fly", mission, "--seed", str(seed), "--instance", str(free_instance()), "--out", name, "--json"]
+        arguments = ["fly", mission, "--policy", policy, "--seed", str(seed), "--instance", str(free_instance())]
+        arguments += ["--out", name, "--json"]
         began_s = time.monotonic()
         ended = subprocess.run(
             [sys.executable, "-c", SWIFTNAV, *arguments], capture_output=True, text=True, check=False

@@ -57,16 +57,20 @@ TURNS = 5  # of the same inputs
 STANDING_BY, PLAIN, DECIDED = range(3)
 
 
-def measure(seed: int) -> dict[str, Any]:
-    """All ``FIGURES``. Raises InputError for a port in use, FlightError when a flight over UDP did not end well."""
+def measure(seed: int, policy: str | None = None) -> dict[str, Any]:
+    """All ``FIGURES``, flown by the mission's policy or by another.
+
+    Raises InputError for a port in use or an unknown policy, FlightError when a flight over UDP did not end well.
+    """
+    plan = plan_flight("trajectory2", seed, policy=policy)
     load = os.getloadavg()[0]
     rounds = _rounds_s()
     return {
         "bare_rtf": STRETCH_S / float(np.median(rounds[:, 0])),
         "in_process_rtf": STRETCH_S / float(np.median(rounds[:, 1])),
         "in_process_ratio": float(np.median(rounds[:, 0] / rounds[:, 1])),
-        **_closed_loop(plan_flight("trajectory2", seed)),
-        **_medians([fly_once("trajectory2", seed) for _ in range(FLIGHTS)]),
+        **_closed_loop(plan),
+        **_medians([fly_once(plan.mission.name, seed, plan.mission.policy) for _ in range(FLIGHTS)]),
         "load": load,
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",

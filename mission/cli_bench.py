@@ -1,5 +1,7 @@
 """``swiftnav bench``: how quick is it on this machine, and how does it fly where others are measured?"""
 
+from typing import Annotated
+
 import typer
 
 from mission.cli_bench_suites import register
@@ -13,13 +15,16 @@ def bench() -> None:
     """Measurements; each prints the machine it ran on."""
 
 
-@app.command(epilog="Example: swiftnav bench speed --json")
-def speed(seed: Seed = 1, json: Json = False) -> None:
+Policy = Annotated[str | None, typer.Option(help="Who flies in RL mode, instead of the mission's; e.g. geometric.")]
+
+
+@app.command(epilog="Example: swiftnav bench speed --policy geometric --json")
+def speed(policy: Policy = None, seed: Seed = 1, json: Json = False) -> None:
     """Ratios to bare JSBSim stepping, the closed loop over UDP, the ticks, the companion's memory."""
     require_extra("sitl", "bench speed")
     from mission.bench_speed import FIGURES, measure
 
-    figures = measure(seed)
+    figures = measure(seed, policy)
     if json:
         print_json(figures)
         return
