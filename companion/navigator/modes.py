@@ -11,7 +11,7 @@ from companion.core.task import Task
 from companion.core.types import NavMode, Setpoint, VehicleState
 from companion.guidance import landing, limits, line, swerve
 from companion.navigator.decide import Answer, Decision, Judge, settle
-from companion.navigator.memory import Engagement, Memory, Path
+from companion.navigator.memory import Engagement, Memory
 from companion.navigator.params import Params
 from companion.navigator.track import Route, Tracked, course_along, track, turned
 from companion.perception.perceive import Percept
@@ -94,7 +94,7 @@ def _follow(memory: Memory, engaged: Engagement, scene: Scene, asked: Asked | No
             memory, engaged, asked.query, asked.answer, scene.percept, scene.params, asked.judge
         )
     path, params = engaged.path, scene.params
-    if path is None or _must_stop(scene, _stop_margin(path, scene.params)):
+    if path is None or _must_stop(scene):
         planned_rad = None if path is None else course_along(path.vertices_ne_m, path.s_m)
         swerved = _swerved(memory, engaged, scene, planned_rad) if _must_stop(scene) else None
         return replace(swerved or _held(memory, replace(engaged, path=None), scene), decision=decision)
@@ -121,11 +121,6 @@ def _land(memory: Memory, engaged: Engagement, scene: Scene) -> Steered:
     return Steered(memory, engaged, setpoint, touchdown=command.touchdown)
 
 
-def _stop_margin(path: Path, params: Params) -> float:
-    """What the stop rule adds to the hull: a path with a run-out meets the next at full speed, and leaves it."""
-    return params.policy.learned_stop_margin_m if path.run_out_m > 0.0 else 0.0
-
-
 def _swerved(memory: Memory, engaged: Engagement, scene: Scene, planned_rad: float | None) -> Steered | None:
     """Past what a stop is due for, where the parameters allow it and a side is free; None: stop."""
     state, params = scene.state, scene.params
@@ -139,12 +134,12 @@ def _swerving(memory: Memory, engaged: Engagement, scene: Scene, begun: swerve.S
     return Steered(memory, replace(engaged, stop=None), asked)
 
 
-def _must_stop(scene: Scene, margin_m: float = 0.0) -> bool:
-    """Would going on as now touch something remembered, or come within the margin of it, before the vehicle stands?"""
+def _must_stop(scene: Scene) -> bool:
+    """Would going on as now touch something remembered before the vehicle stands?"""
     return limits.velocity_stop_needed(
         scene.state.pos_ned_m,
         scene.state.vel_ned_m_s,
         scene.percept.static_ne_m,
-        scene.params.vehicle.radius_m + margin_m,
+        scene.params.vehicle.radius_m,
         scene.params.limits,
     )

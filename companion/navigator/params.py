@@ -50,9 +50,6 @@ class PolicyParams:
         0,
         10,
     )
-    learned_stop_margin_m: float = param(
-        0.08, "SN_PO_L_STOP", "On a path with a run-out the stop rule widens the hull by so much more", "m", 0.0, 0.5
-    )
     lead_s: float = param(0.4, "SN_PO_LEAD", "A new path leaves the old one this far ahead", "s", 0.0, 2.0)
     rejoin_m: float = param(0.4, "SN_PO_REJOIN", "Farther off the old path than this, plan from the vehicle", "m", 0, 3)
 

@@ -10,7 +10,6 @@ from scene import CLUTTER, DOWN_M, DT_S, FLYING, HOVERING, PARAMS, Eye, Pilot, r
 from companion.checker.checker import VerdictKind
 from companion.core.task import Task
 from companion.core.types import LandedState, NavMode
-from companion.guidance import limits
 from companion.navigator import Record
 
 STANDING = dataclasses.replace(HOVERING, armed=False, landed=LandedState.ON_GROUND)
@@ -71,25 +70,6 @@ def test_who_took_the_vehicle_back_finds_neither_policy_nor_guard_with_an_old_wa
     pilot.memory = dataclasses.replace(pilot.memory, policy=np.zeros(3), guard=np.zeros((2, 2)))
     memory = pilot.tick(status=HOVERING).memory
     assert (memory.policy, memory.guard) == (None, None)
-
-
-@pytest.mark.parametrize(
-    ("spare_m", "with_run_out", "without"), [(0.15, False, False), (0.1, True, False), (-0.02, True, True)]
-)
-def test_on_a_path_with_a_run_out_the_stop_rule_keeps_more_distance(spare_m, with_run_out, without) -> None:
-    """``spare_m``: what braking from 1.5 m/s leaves before the trunk at north 3.2; the rule asks for 0.06."""
-    stop_m = limits.stopping_distance(1.5, PARAMS.limits.decel_m_s2, PARAMS.limits.stop_tau_s)
-    north_m = 3.2 - PARAMS.vehicle.radius_m - stop_m - spare_m
-    for run_out_m, stops in ((4.0, with_run_out), (0.0, without)):
-        pilot, record = in_rl()
-        engaged = record.memory.engaged
-        assert engaged is not None and engaged.path is not None
-        path = dataclasses.replace(engaged.path, run_out_m=run_out_m)
-        engaged = dataclasses.replace(engaged, path=path, tried_t_s=math.inf)  # no decision
-        pilot.memory = dataclasses.replace(pilot.memory, engaged=engaged)
-        after = pilot.tick(pos_ned_m=(north_m, 0.3, DOWN_M), vel_ned_m_s=(1.5, 0.0, 0.0)).memory.engaged
-        assert after is not None
-        assert ((after.stop is not None), (after.path is None)) == (stops, stops)
 
 
 @pytest.mark.parametrize("ground_down_m", [-1.2, -0.5, 0.0, 0.7])
