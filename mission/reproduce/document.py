@@ -49,9 +49,9 @@ METHOD = """## How it was done
   environment. Future work gets three seeds. What was not run, or not to its end, is not in the tables; `seeds` says
   how many were finished.
 - A seed of the baseline ends with the ticks that the same seed of SWIFT-Nav used. With one update a decision it learns
-  twice as often a tick as SWIFT-Nav with four, since it decides every fifth tick.
+  twice as often a tick as SWIFT-Nav with four, since it decides every second tick. Every arm gets 12.5 scans a second.
 - An episode ends above the goal, and any contact ends it; flights in which RL mode is never entered are not counted.
-- The baseline commands velocity and yaw rate at 5 Hz, with no arbiter, checker or guidance. It has arrived within 2 m
+- The baseline commands velocity and yaw rate at 6 Hz, with no arbiter, checker or guidance. It has arrived within 2 m
   of the goal; SWIFT-Nav has to begin its landing within 0.5 m.
 - No-Stability: hysteresis, debounce and dwell off, line of sight stays. No-Checker: proposals are flown as they are;
   the limits on speed and the stop rule stay. A switch beyond the bound is one that full stability would not allow.

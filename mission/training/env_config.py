@@ -18,6 +18,8 @@ from mission.mission_file import Mission, NoiseSpec, Success, Turbulence, WindSp
 from mission.training.episode import Until
 from mission.training.flight import FlightSpec
 from mission.training.reward_tables import reward_table
+from sitl.lidar import LidarParams
+from sitl.simulation import scan_steps
 from sitl.world import World
 
 NAME = "training"  # of mission and policy: as a policy's it gives paths a learned policy's horizon
@@ -34,6 +36,7 @@ RANGES = {  # as for missions
     "dropout": (0.0, 0.99),
     "latency_s": (0.0, 1.0),
     "scan_latency_s": (0.0, 1.0),
+    "scan_rate_hz": (5.0, 50.0),
     "spawn_jitter_m": (0.0, 10.0),
     "cruise_m_s": (0.3, 15.0),
 }
@@ -60,6 +63,7 @@ class EnvConfig:
     dropout: float = 0.0
     latency_s: float = 0.05  # from scan to setpoint in force
     scan_latency_s: float = 0.0  # besides
+    scan_rate_hz: float = 25.0  # fewer scans: flights that cost less, and a slower vehicle
     wind_m_s: tuple[float, float] = (1.0, 5.0)  # the mean is drawn from this range
     turbulence: Turbulence = "light"
     spawn_jitter_m: float = 2.0
@@ -85,6 +89,10 @@ class EnvConfig:
         for name, (least, most) in RANGES.items():
             if not least <= getattr(self, name) <= most:
                 raise InputError(f"{name} {getattr(self, name)} is outside [{least:g}, {most:g}]")
+        try:
+            scan_steps(LidarParams(rate_hz=self.scan_rate_hz))
+        except ValueError as error:
+            raise InputError(f"scan_rate_hz: {error}") from error
         if not 0.0 <= self.wind_m_s[0] <= self.wind_m_s[1] <= WIND_MAX_M_S:
             raise InputError(f"wind_m_s {list(self.wind_m_s)} wants [low, high] in [0, {WIND_MAX_M_S:g}]")
         if not 0.0 < self.time_limit_s <= 3600.0:
@@ -127,5 +135,6 @@ def flight_spec(world: World, seed: int, config: EnvConfig, params: Params) -> F
         config.time_limit_s,
         config.latency_s,
         config.scan_latency_s,
+        config.scan_rate_hz,
         config.discount_per_s,
     )

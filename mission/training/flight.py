@@ -7,7 +7,7 @@ measured. Vehicle time only: a flight is a function of its plan and of the answe
 
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
@@ -18,7 +18,6 @@ from mission.training import reward
 from mission.training.reward import RewardState, TickFacts
 from mission.training.reward_tables import PAPER_STEP_S, RewardTable
 from mission.training.way_field import way_field
-from sitl.lidar import LidarParams
 from sitl.modes import FlightMode
 from sitl.simulation import Observation, SimConfig, Simulation
 
@@ -49,6 +48,7 @@ class FlightSpec:
     time_limit_s: float = 90.0  # vehicle time from the hand-over
     latency_s: float = 0.05  # from scan to setpoint in force
     scan_latency_s: float = 0.0  # besides: how late a scan arrives
+    scan_rate_hz: float = 25.0
     discount_per_s: float = 0.98
 
 
@@ -231,14 +231,5 @@ class Flight:
 
 def _config(spec: FlightSpec) -> SimConfig:
     config = sim_config(spec.plan)
-    lidar = LidarParams(sigma_m=config.lidar.sigma_m, dropout=config.lidar.dropout, latency_s=spec.scan_latency_s)
-    return SimConfig(
-        seed=config.seed,
-        spawn_ned_m=config.spawn_ned_m,
-        spawn_yaw_rad=config.spawn_yaw_rad,
-        wind=config.wind,
-        latency_s=spec.latency_s,
-        radius_m=config.radius_m,
-        lidar=lidar,
-        faults=config.faults,
-    )
+    lidar = replace(config.lidar, latency_s=spec.scan_latency_s, rate_hz=spec.scan_rate_hz)
+    return replace(config, latency_s=spec.latency_s, lidar=lidar)

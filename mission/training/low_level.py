@@ -32,7 +32,7 @@ from sitl.simulation import Observation
 F32 = NDArray[np.float32]
 ACTIONS = 3
 YAW_RATE_MAX_RAD_S = 1.2  # as fast as the navigator turns the nose
-HOLD_TICKS = 5  # an action is flown for so many scans: 5 Hz
+HOLD_S = 0.2  # an action is flown for, in whole scans
 OBSERVATIONS = ("goal", "paper")
 MODE = "low_level"
 STILL = np.zeros(ACTIONS)
@@ -43,7 +43,7 @@ class SwiftNavLowLevelEnv(gymnasium.Env[F32, F32]):
 
     Observation: ``Box(-inf, inf, (72,), float32)``: ``goal`` or ``paper`` of ``SwiftNav-v0``, from the present scan.
 
-    Action: ``Box(-1, 1, (3,), float32)``, flown for ``hold_ticks`` scans (declared; 5 of 40 ms unless said otherwise):
+    Action: ``Box(-1, 1, (3,), float32)``, flown for ``hold_ticks`` scans (default: 5 of 40 ms, 2 of 80 ms):
 
     | number | what |
     |---|---|
@@ -58,15 +58,15 @@ class SwiftNavLowLevelEnv(gymnasium.Env[F32, F32]):
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (Gymnasium's own class attribute)
 
     def __init__(
-        self, world: Worlds = "trajectory1", config: EnvConfig | None = None, hold_ticks: int = HOLD_TICKS
+        self, world: Worlds = "trajectory1", config: EnvConfig | None = None, hold_ticks: int | None = None
     ) -> None:
         """``world``: see ``training_worlds.world_source``. Raises InputError or ParamError."""
         self.config = config or EnvConfig()
         if self.config.observation not in OBSERVATIONS:
             raise InputError(f"observation '{self.config.observation}' needs a map: the baseline has {OBSERVATIONS}")
-        if hold_ticks < 1:
+        self._hold_ticks = round(HOLD_S * self.config.scan_rate_hz) if hold_ticks is None else hold_ticks
+        if self._hold_ticks < 1:
             raise InputError(f"hold_ticks {hold_ticks} is below 1")
-        self._hold_ticks = hold_ticks
         self._params = navigator_params(self.config)
         self._source = world_source(world, self._params.vehicle.radius_m)
         self._no_grid = gridmap.empty(self._params.map)

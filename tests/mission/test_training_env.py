@@ -285,6 +285,18 @@ def test_the_baseline_may_leave_the_map() -> None:
     assert info["episode"]["end"] == "out_of_bounds" and info["episode"]["rows"]["failure"] == -1500.0
 
 
+@pytest.mark.parametrize("env_class", [SwiftNavEnv, SwiftNavLowLevelEnv])
+def test_scans_come_as_often_as_the_configuration_says(env_class: Any) -> None:
+    env = env_class(WAY, replace(CALM, scan_rate_hz=12.5))
+    env.reset(seed=0)
+    at_s = [env.flight.sim.t_s, env.flight.next_scan().state.t_s]
+    assert at_s[1] - at_s[0] == pytest.approx(0.08)
+    with pytest.raises(InputError, match=r"scan_rate_hz: LiDAR: 24.0 Hz is no whole number of 4 ms physics steps"):
+        EnvConfig(scan_rate_hz=24.0)
+    with pytest.raises(InputError, match=r"scan_rate_hz 60.0 is outside \[5, 50\]"):
+        EnvConfig(scan_rate_hz=60.0)
+
+
 def test_the_baseline_declares_how_long_an_action_lasts() -> None:
     env = SwiftNavLowLevelEnv(WAY, CALM, hold_ticks=3)
     env.reset(seed=0)
