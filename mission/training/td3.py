@@ -1,10 +1,11 @@
 """How does the policy improve from transitions? TD3 (eqs. td3_target, td3_soft; algorithm td3_per), one file.
 
 Clipped double Q, delayed actor, target smoothing, soft targets. A transition is one RL decision that lasted some ticks,
-so it carries its own discount: y = r + discount * (1 - terminated) * min Q'. Two things that the paper does not have: a
-penalty on the actor's output before tanh, without which the actions run into their bounds and stay there, and a number
-of updates in which only the critics learn. State is complete: saved and loaded at any update, training goes on bit for
-bit.
+so it carries its own discount: y = r + discount * (1 - terminated) * min Q'. What the paper does not have: a penalty on
+the actor's output before tanh, without which the actions run into their bounds and stay there; a number of updates in
+which only the critics learn; rates that fall, and a running average of the actor that flies in its place once trained,
+because an actor late in training goes to and fro between good and bad. State is complete: saved and loaded at any
+update, training goes on bit for bit.
 """
 
 from copy import deepcopy
@@ -25,6 +26,7 @@ F32 = NDArray[np.float32]
 State = dict[str, Any]
 
 SATURATED = 0.95  # an action beyond this is counted as run into its bound
+LEAST_RATE = 0.1  # of the first rate, where rates fall
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,8 @@ class TD3Config:
     actor_after: int = 0  # updates before the actor begins to learn
     saturation_penalty: float = 0.3  # times the mean square of the actor's output before tanh
     reward_scale: float = 0.01  # rewards as the critics see them: of order one
+    rates_fall_over: int = 0  # updates in which both rates fall evenly to a tenth; 0: they stay
+    average: float = 0.0  # how far, an update of the actor, what flies follows what learns; 0: what learns flies
     huber: bool = False  # critic loss linear beyond 1: belongs to ``replay: lap``
     zero_last: bool = True  # the untrained actor says zero
     device: str = "cpu"
@@ -49,8 +53,9 @@ class TD3Config:
         """Raise ValueError naming what is out of range."""
         if min(self.hidden, default=1) < 1:
             raise ValueError(f"'hidden' = {list(self.hidden)} wants layers of at least 1")
-        if not 0.0 <= self.tau <= 1.0:
-            raise ValueError(f"'tau' = {self.tau} is outside [0, 1]")
+        for name in ("tau", "average"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"'{name}' = {getattr(self, name)} is outside [0, 1]")
         for name, most in (("actor_rate", 1.0), ("critic_rate", 1.0), ("reward_scale", np.inf)):
             if not 0.0 < getattr(self, name) <= most:
                 raise ValueError(f"'{name}' = {getattr(self, name)} is outside (0, {most:g}]")
@@ -59,6 +64,7 @@ class TD3Config:
             ("smoothing_clip", 0),
             ("saturation_penalty", 0),
             ("actor_after", 0),
+            ("rates_fall_over", 0),
             ("actor_every", 1),
         ):
             if not getattr(self, name) >= least:
@@ -76,6 +82,7 @@ class TD3:
         self._actor = actor_net(obs_dim, action_dim, config.hidden, seed, config.zero_last).to(self._device)
         self._critic = TwinCritic(obs_dim + action_dim, config.hidden, seed + 1).to(self._device)
         self._actor_target, self._critic_target = deepcopy(self._actor), deepcopy(self._critic)
+        self._average = deepcopy(self._actor) if config.average else self._actor
         self._actor_optimiser = _adam(self._actor, config.actor_rate)
         self._critic_optimiser = _adam(self._critic, config.critic_rate)
         self._generator = torch.Generator(self._device).manual_seed(seed)
@@ -89,8 +96,8 @@ class TD3:
         return greedy
 
     def actor(self) -> Actor:
-        """A copy of the actor that flies without torch."""
-        return as_numpy(self._actor)
+        """A copy of what flies once trained: the actor, or its running average. Without torch."""
+        return as_numpy(self._average)
 
     def update(self, batch: Batch) -> dict[str, Any]:
         """One update.
@@ -105,7 +112,7 @@ class TD3:
         values = self._critic(b.obs, b.action)
         errors = functional.smooth_l1_loss if self.config.huber else functional.mse_loss
         loss = (errors(values, target.expand_as(values), reduction="none").sum(dim=0) * b.weights).mean()
-        _descend(self._critic, self._critic_optimiser, loss)
+        _descend(self._critic, self._critic_optimiser, loss, self.config.critic_rate * self._rate_left())
         self._updates += 1
         figures = {
             "td_errors": (values[0] - target).detach().abs().cpu().numpy().astype(np.float64),
@@ -121,7 +128,8 @@ class TD3:
 
     def state_dict(self) -> State:
         """All that decides the next update."""
-        return {
+        average = {"average": _copied(self._average.state_dict())} if self.config.average else {}
+        return average | {
             "actor": _copied(self._actor.state_dict()),
             "critic": _copied(self._critic.state_dict()),
             "actor_target": _copied(self._actor_target.state_dict()),
@@ -138,6 +146,8 @@ class TD3:
         self._critic.load_state_dict(state["critic"])
         self._actor_target.load_state_dict(state["actor_target"])
         self._critic_target.load_state_dict(state["critic_target"])
+        if self.config.average:
+            self._average.load_state_dict(state["average"])
         self._actor_optimiser.load_state_dict(state["actor_optimiser"])
         self._critic_optimiser.load_state_dict(state["critic_optimiser"])
         self._generator.set_state(state["generator"])
@@ -156,9 +166,17 @@ class TD3:
         action = torch.tanh(output)
         penalty = self.config.saturation_penalty * output.square().mean()
         loss = penalty - self._critic.first(obs, action).mean()
-        _descend(self._actor, self._actor_optimiser, loss)
+        _descend(self._actor, self._actor_optimiser, loss, self.config.actor_rate * self._rate_left())
+        if self.config.average:
+            _follow(self._average, self._actor, self.config.average)
         saturated = (action.detach().abs() > SATURATED).float().mean()
         return {"actor_loss": float(loss.detach()), "saturated": float(saturated)}
+
+    def _rate_left(self) -> float:
+        """Share of the first rates for the next step."""
+        if not self.config.rates_fall_over:
+            return 1.0
+        return 1.0 - (1.0 - LEAST_RATE) * min(self._updates / self.config.rates_fall_over, 1.0)
 
     def _tensors(self, batch: Batch) -> "_Tensors":
         columns = (batch.obs, batch.action, batch.reward, batch.next_obs, batch.discount, batch.terminated)
@@ -183,11 +201,12 @@ def _adam(net: nn.Module, rate: float) -> torch.optim.Adam:
     return torch.optim.Adam(net.parameters(), lr=rate, fused=True)
 
 
-def _descend(net: nn.Module, optimiser: torch.optim.Adam, loss: Tensor) -> None:
+def _descend(net: nn.Module, optimiser: torch.optim.Adam, loss: Tensor, rate: float) -> None:
     """One step; gradients of this net alone, whatever else the loss went through."""
     parameters = list(net.parameters())
     for parameter, slope in zip(parameters, torch.autograd.grad(loss, parameters), strict=True):
         parameter.grad = slope
+    optimiser.param_groups[0]["lr"] = rate
     optimiser.step()
 
 

@@ -125,6 +125,33 @@ def test_the_actor_waits_while_only_the_critics_learn() -> None:
     assert not (learner.actor().weights[0] == first.weights[0]).all()
 
 
+def test_what_flies_follows_what_learns_slowly_and_no_other_weight_knows() -> None:
+    plain, averaged = (TD3(OBS, ACTION, TD3Config(hidden=(16,), average=share), seed=0) for share in (0.0, 0.25))
+    expected = plain.actor().biases[-1]
+    for k in range(6):
+        for learner in (plain, averaged):
+            learner.update(batch(seed=k))
+        if k % 2 == 1:
+            expected = 0.75 * expected + 0.25 * plain.actor().biases[-1]
+    assert averaged.actor().biases[-1] == pytest.approx(expected, abs=1e-7)
+    assert not np.allclose(plain.actor().biases[-1], expected)
+    obs = np.ones(OBS, np.float32)
+    assert (averaged.act(obs) == plain.act(obs)).all()
+
+
+def test_rates_fall_evenly_to_a_tenth_and_stay_there() -> None:
+    config = TD3Config(hidden=(8,), actor_every=1, actor_rate=1e-3, critic_rate=2e-3, rates_fall_over=4)
+    learner = TD3(OBS, ACTION, config, seed=0)
+    rates = []
+    for k in range(7):
+        learner.update(batch(seed=k))
+        state = learner.state_dict()
+        rates.append([state[f"{name}_optimiser"]["param_groups"][0]["lr"] for name in ("critic", "actor")])
+    shares = np.array([1.0, 0.775, 0.55, 0.325, 0.1, 0.1, 0.1, 0.1])
+    assert np.array(rates)[:, 0] == pytest.approx(2e-3 * shares[:-1])
+    assert np.array(rates)[:, 1] == pytest.approx(1e-3 * shares[1:])
+
+
 def test_an_untrained_actor_says_zero() -> None:
     assert (TD3(OBS, ACTION, TD3Config(), 0).act(np.ones(OBS, np.float32)) == 0.0).all()
 
@@ -150,7 +177,7 @@ def bytes_of(learner: TD3) -> bytes:
 
 @pytest.mark.parametrize("kind", ["per", "uniform"])
 def test_training_goes_on_bit_for_bit_from_the_middle(kind: str, tmp_path: Path) -> None:
-    config = TD3Config(hidden=(32, 32), huber=True)
+    config = TD3Config(hidden=(32, 32), huber=True, rates_fall_over=80, average=0.05)
 
     def started(seed: int) -> tuple[TD3, Replay]:
         replay = Replay(kind, 256, OBS, ACTION, ReplayConfig(), seed)
@@ -174,6 +201,7 @@ def test_training_goes_on_bit_for_bit_from_the_middle(kind: str, tmp_path: Path)
     other.load_state_dict(kept)
     train(resumed, other, 50)
     assert bytes_of(resumed) == bytes_of(whole)
+    assert (resumed.actor().weights[0] == whole.actor().weights[0]).all()
 
 
 def test_td3_learns_where_to_point() -> None:
