@@ -70,7 +70,7 @@ def fly(
 ) -> None:
     """Fly a mission over MAVLink, judge it, leave a flight folder. Exit code 0 only on success."""
     require_extra("sitl", "fly")
-    from companion.app.profiles import merged, profile_named
+    from companion.navigator.profiles import merged, profile_named
     from mission.console import FlightConsole, LogTail, print_result
     from mission.flight_folder import make_folder
     from mission.flight_plan import plan_flight

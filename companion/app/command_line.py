@@ -21,7 +21,6 @@ from companion.app.config import VEHICLE_URL, CompanionConfig, Engage
 from companion.app.preflight import check
 from companion.app.preflight.listen import LISTEN_S
 from companion.app.preflight.show import print_json, print_table
-from companion.app.profiles import merged, profile_named, profile_names
 from companion.app.run import fly
 from companion.app.status import ExitCode
 from companion.core import params
@@ -29,6 +28,7 @@ from companion.core.params import ParamError
 from companion.core.task import Task
 from companion.core.url import parse_url
 from companion.navigator import Params
+from companion.navigator.profiles import merged, profile_named, profile_names
 
 CRUISE_M_S = 3.0
 ELSEWHERE = [50.0, 0.0]  # a goal for a check that was not told one

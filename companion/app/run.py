@@ -22,6 +22,7 @@ from companion.core.keyring import KeyFileError
 from companion.core.transport import TransportError
 from companion.link.lidar import LidarError
 from companion.navigator.decide import policy_named
+from companion.navigator.tightness import tight_set
 
 DISTRIBUTIONS = ("swiftnav", "numpy", "scipy", "pymavlink")
 
@@ -49,7 +50,8 @@ def fly(
     with ExitStack() as stack:
         try:
             check(config)
-            policy_named(config.params.policy.name, config.params)  # reads the weights now, not in flight
+            for tuned in (config.params, tight_set(config.params)):
+                policy_named(tuned.policy.name, tuned)  # reads profile and weights now, not in flight
             opened = open_all(config, clock, stack)
             logs = stack.enter_context(closing(FlightLogs(config.log_dir)))
         except (ConfigError, params.ParamError, KeyFileError, TransportError, LidarError, LogFolderError) as error:

@@ -106,6 +106,16 @@ def update(grid: GridMap, scan: PolarScan, params: MapParams) -> GridMap:
     return GridMap(grid.cell_m, grid.corner, free_t, hit_t, hit_ne_m, moved_ne_m)
 
 
+def with_hits(grid: GridMap, hits_ne_m: F64, pos_ne_m: F64, t_s: float) -> GridMap:
+    """The map round the vehicle with the hits (k, 2) of another map as well, as if seen now: the next scan refutes."""
+    grid = _rolled(grid, pos_ne_m)
+    cells, inside = cells_of(grid, hits_ne_m)
+    hit_t, hit_ne_m = grid.hit_t.copy(), grid.hit_ne_m.copy()
+    hit_t.ravel()[cells[inside]] = t_s
+    hit_ne_m.reshape(-1, 2)[cells[inside]] = hits_ne_m[inside]
+    return GridMap(grid.cell_m, grid.corner, grid.free_t, hit_t, hit_ne_m, np.empty((0, 2)))
+
+
 def occupied(grid: GridMap, t_s: float, params: MapParams) -> NDArray[np.bool_]:
     """(n, n) cells that hold a hit young enough to count."""
     return grid.hit_t > np.float32(max(t_s - params.forget_s, 0.0))

@@ -1,5 +1,6 @@
 """What does the navigator remember from tick to tick? One immutable value."""
 
+import math
 from dataclasses import dataclass
 
 from companion.arbiter import arbiter
@@ -45,6 +46,16 @@ class Engagement:
 
 
 @dataclass(frozen=True, slots=True)
+class Tightness:
+    """Which parameter set flies (``navigator.tightness``)."""
+
+    since_t_s: float = -math.inf
+    aside: GridMap | None = None  # where it is tight: the map of the open, as it was last; None: it is open
+    push_ne_m_s2: tuple[float, float] = (0.0, 0.0)  # of the air
+    calm: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class Memory:
     """Everything remembered; ``engaged`` only while the autopilot reports OFFBOARD and armed."""
 
@@ -59,6 +70,7 @@ class Memory:
     state: VehicleState | None  # the last one that could be believed
     ground_down_m: float  # where the autopilot last stood, by its own estimate
     engaged: Engagement | None
+    tight: Tightness = Tightness()
 
 
 def start(params: Params) -> Memory:

@@ -61,6 +61,20 @@ class PolicyParams:
 
 
 @dataclass(frozen=True, slots=True)
+class TightParams:
+    """When another set of parameters flies."""
+
+    profile: str = param("", "SN_TI_PROFILE", "Profile that flies where it is tight; empty: none does")
+    radius_m: float = param(3.0, "SN_TI_RADIUS", "Density counts bearings blocked within this", "m", 0.5, 30.0)
+    density_enter: float = param(0.5, "SN_TI_ENTER", "Density from which it is tight", "", 0.0, 1.0)
+    density_exit: float = param(0.3, "SN_TI_EXIT", "Density up to which it is open again", "", 0.0, 1.0)
+    dwell_s: float = param(2.0, "SN_TI_DWELL", "Least time between two changes", "s", 0.1, 60.0)
+    calm_m_s2: float = param(
+        0.35, "SN_TI_CALM", "Push of the air from which margins stay as in the open", "m/s^2", 0, 10
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class Params:
     """All of it."""
 
@@ -71,6 +85,7 @@ class Params:
     map: MapParams = field(default_factory=MapParams)
     movers: MoverParams = field(default_factory=MoverParams)
     arbiter: ArbiterParams = field(default_factory=ArbiterParams)
+    tight: TightParams = field(default_factory=TightParams)
     policy: PolicyParams = field(default_factory=PolicyParams)
     expert: ExpertParams = field(default_factory=ExpertParams)
     checker: CheckerParams = field(default_factory=CheckerParams)

@@ -73,6 +73,8 @@ class Record:
             "sp_acc_ned_m_s2": _list(self.setpoint.acc_ned_m_s2),
             "sp_yaw_rad": self.setpoint.yaw_rad,
         }
+        if self.memory.tight.aside is not None:
+            row["tight"] = True
         if self.decision is not None:
             row |= _decided(self.decision)
         return row

@@ -18,9 +18,10 @@ from companion.core.inputs import Inputs
 from companion.core.task import Task
 from companion.core.types import AutopilotStatus, LandedState, NavMode, Setpoint, VehicleState
 from companion.guidance import landing, line
+from companion.navigator import tightness
 from companion.navigator.believe import believable, stand_in
 from companion.navigator.decide import Answer, Judge, ask, due, question
-from companion.navigator.memory import Engagement, Memory
+from companion.navigator.memory import Engagement, Memory, Tightness
 from companion.navigator.modes import Asked, Scene, steer
 from companion.navigator.params import Params
 from companion.navigator.record import Record
@@ -34,6 +35,7 @@ class Pending:
 
     query: Query | None  # None: no decision is due, ``act`` needs no answer
     memory: Memory
+    params: Params  # in force
     inputs: Inputs
     percept: Percept
     goal_m: float
@@ -54,7 +56,7 @@ def tick(memory: Memory, inputs: Inputs, task: Task, params: Params) -> tuple[Me
         The next memory, the setpoint that answers the scan, and the record of the tick.
     """
     pending = sense(memory, inputs, task, params)
-    return act(pending, None if pending.query is None else ask(pending.query, pending.memory.policy, params))
+    return act(pending, None if pending.query is None else ask(pending.query, pending.memory.policy, pending.params))
 
 
 def sense(memory: Memory, inputs: Inputs, task: Task, params: Params) -> Pending:
@@ -63,6 +65,9 @@ def sense(memory: Memory, inputs: Inputs, task: Task, params: Params) -> Pending
     if not known:
         inputs = stand_in(inputs, memory.state, memory.t_s)
     state = inputs.state
+    if not inputs.status.armed:
+        memory = replace(memory, tight=Tightness())
+    params = tightness.in_force(memory, params)
     percept = perceive(
         _remembered(memory, inputs.status, params),
         inputs,
@@ -80,11 +85,12 @@ def sense(memory: Memory, inputs: Inputs, task: Task, params: Params) -> Pending
         ticks=memory.ticks + 1,
         t_s=state.t_s,
         state=state if known else memory.state,
+        tight=tightness.felt(memory.tight, memory.state, state, params.tight) if known else memory.tight,
         ground_down_m=_ground(memory, inputs) if known else memory.ground_down_m,
     )
     goal_m = _goal_distance(state, task)
     if not (inputs.status.offboard and inputs.status.armed) or memory.state is None:
-        return Pending(None, memory, inputs, percept, goal_m, None, None)
+        return Pending(None, memory, params, inputs, percept, goal_m, None, None)
     engaged = memory.engaged or _engage(state, task)
     facts = _facts(inputs, percept, engaged, goal_m)
     scene = Scene(state, percept, task, params, _thresholds(percept, params), facts, dt_s, memory.ground_down_m)
@@ -92,7 +98,7 @@ def sense(memory: Memory, inputs: Inputs, task: Task, params: Params) -> Pending
     query = None
     if engaged.arbiter.mode == NavMode.RL and not engaged.arbiter.hold and due(engaged, state, percept, task, params):
         query = question(engaged, state, percept, task, params)
-    return Pending(query, memory, inputs, percept, goal_m, engaged, scene)
+    return Pending(query, memory, params, inputs, percept, goal_m, engaged, scene)
 
 
 def act(pending: Pending, answer: Answer | None, judge: Judge = check) -> tuple[Memory, Setpoint, Record]:
@@ -112,6 +118,8 @@ def act(pending: Pending, answer: Answer | None, judge: Judge = check) -> tuple[
     steered = steer(memory, engaged, scene, asked)
     yaw_sp = memory.yaw_sp_rad if steered.setpoint.yaw_rad is None else steered.setpoint.yaw_rad
     memory = replace(steered.memory, engaged=steered.engaged, yaw_sp_rad=yaw_sp)
+    verdict = None if steered.decision is None else steered.decision.verdict
+    memory = tightness.noticed(memory, percept, verdict, scene.params)
     flown_s = steered.engaged.arbiter.t_s - engaged.engaged_t_s
     bound = arbiter.switch_bound(flown_s, scene.params.arbiter, steered.engaged.arbiter.aborts)
     record = Record(

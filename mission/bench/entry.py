@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from companion import navigator
-from companion.app.profiles import profile_named
+from companion.navigator.profiles import profile_named
 from companion.core import params as core_params
 from companion.policy.store import digest_of, shipped
 from mission.bench.course import Course

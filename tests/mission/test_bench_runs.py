@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bench_rows import row
 
-from companion.app.profiles import profile_named, profile_names
+from companion.navigator.profiles import profile_named, profile_names
 from companion.core import params as core_params
 from companion.core.params import ParamError
 from companion.core.types import Scan, Setpoint
