@@ -9,12 +9,13 @@ from companion.arbiter.facts import Facts, Thresholds, landing_safe
 from companion.core import geometry
 from companion.core.task import Task
 from companion.core.types import NavMode, Setpoint, VehicleState
-from companion.guidance import landing, limits, line, swerve
+from companion.guidance import landing, limits, line, swerve, yielding
 from companion.navigator.decide import Answer, Decision, Judge, settle
 from companion.navigator.memory import Engagement, Memory
 from companion.navigator.params import Params
 from companion.navigator.track import Route, Tracked, course_along, track, turned
 from companion.perception.perceive import Percept
+from companion.perception.threats import threats
 from companion.policy.interface import Query
 
 
@@ -55,6 +56,12 @@ class Asked:
 
 def steer(memory: Memory, engaged: Engagement, scene: Scene, asked: Asked | None) -> Steered:
     """The setpoint of the mode; braking and holding come first. ``asked``: where a decision was due."""
+    steered = _by_mode(memory, engaged, scene, asked)
+    gives_way = scene.params.yielding.ahead_s > 0.0 and not engaged.arbiter.hold
+    return _giving_way(steered, scene) if gives_way else steered
+
+
+def _by_mode(memory: Memory, engaged: Engagement, scene: Scene, asked: Asked | None) -> Steered:
     if engaged.arbiter.hold:
         return _held(memory, engaged, scene)
     if engaged.arbiter.mode == NavMode.LANDING:
@@ -132,6 +139,23 @@ def _swerved(memory: Memory, engaged: Engagement, scene: Scene, planned_rad: flo
 def _swerving(memory: Memory, engaged: Engagement, scene: Scene, begun: swerve.Swerve, turning: bool) -> Steered:
     asked = swerve.setpoint(begun, scene.state, turning, engaged.down_m, memory.yaw_sp_rad, scene.params.limits)
     return Steered(memory, replace(engaged, stop=None), asked)
+
+
+def _giving_way(steered: Steered, scene: Scene) -> Steered:
+    """The same, with another velocity where what moves asks for it."""
+    state, percept, params = scene.state, scene.percept, scene.params
+    near = threats(percept.tracks, percept.static_ne_m, state.t_s, params.movers)
+    if len(near.pos_ne_m) == 0:
+        return steered
+    asked = steered.setpoint.vel_ned_m_s
+    wanted = np.zeros(2) if asked is None or steered.engaged.stop is not None else asked[:2]
+    moving = yielding.Moving(near.pos_ne_m, near.vel_ne_m_s, near.doubt_m_s, params.movers.radius_m)
+    hull = yielding.Hull(params.vehicle.radius_m, scene.task.cruise_m_s, scene.dt_s)
+    other = yielding.give_way(state, wanted, moving, near.static_ne_m, hull, params.yielding)
+    if other is None:
+        return steered
+    setpoint = yielding.setpoint(state, other, steered.engaged.down_m, steered.memory.yaw_sp_rad, params.yielding)
+    return replace(steered, engaged=replace(steered.engaged, stop=None), setpoint=setpoint, touchdown=False)
 
 
 def _must_stop(scene: Scene) -> bool:

@@ -10,6 +10,7 @@ from companion.guidance.follower import FollowerParams
 from companion.guidance.landing import LandingParams
 from companion.guidance.limits import LimitsParams
 from companion.guidance.line import LineParams
+from companion.guidance.yielding import YieldParams
 from companion.link.lidar_params import LidarParams
 from companion.link.params import LinkParams
 from companion.perception.movers import MoverParams
@@ -93,3 +94,4 @@ class Params:
     follower: FollowerParams = field(default_factory=FollowerParams)
     limits: LimitsParams = field(default_factory=LimitsParams)
     landing: LandingParams = field(default_factory=LandingParams)
+    yielding: YieldParams = field(default_factory=YieldParams)

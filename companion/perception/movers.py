@@ -32,6 +32,14 @@ class MoverParams:
     hits: int = param(6, "SN_MV_HITS", "and was seen in this many scans", "", 2, 100)
     slow_m_s: float = param(0.3, "SN_MV_SLOW", "and moves faster than this", "m/s", 0.0, 3.0)
     coast_s: float = param(0.8, "SN_MV_COAST", "A track not seen for this long is dropped", "s", 0.1, 5.0)
+    again_m: float = param(
+        0.0, "SN_MV_AGAIN", "Tracks are found again in all hits so near (0: where space was free)", "m", 0, 3
+    )
+    split_m: float = param(0.35, "SN_MV_SPLIT", "Then neighbouring hits farther apart are two things", "m", 0.05, 3.0)
+    settled: int = param(12, "SN_MV_SETTLED", "In so many scans its velocity has become known", "", 2, 100)
+    doubt_m_s: float = param(0.3, "SN_MV_DOUBT", "How far off a known velocity may be", "m/s", 0.0, 3.0)
+    unknown_m_s: float = param(1.0, "SN_MV_UNKNOWN", "How far off it may be before", "m/s", 0.0, 5.0)
+    fast_m_s: float = param(2.0, "SN_MV_FAST", "Nothing moves faster", "m/s", 0.1, 20.0)
     gain_pos: float = param(0.35, "SN_MV_GAIN_P", "alpha of the filter", "", 0.01, 1.0)
     gain_vel: float = param(0.07, "SN_MV_GAIN_V", "beta of the filter", "", 0.001, 1.0)
 
@@ -63,9 +71,9 @@ def follow(
     step_s = min(max(dt_s, 0.0), MAX_STEP_S)
     coasting = [replace(t, pos_ne_m=t.pos_ne_m + t.vel_ne_m_s * step_s) for t in tracks]
     coasting = [t for t in coasting if t_s - t.seen_t_s <= params.coast_s]
-    for centre in _centres(moved_ne_m, pos_ne_m, params):
-        nearest = min(range(len(coasting)), key=lambda i: _distance(coasting[i].pos_ne_m, centre), default=None)
-        if nearest is None or _distance(coasting[nearest].pos_ne_m, centre) > params.gate_m:
+    for centre in centres_of(moved_ne_m, pos_ne_m, params):
+        nearest = min(range(len(coasting)), key=lambda i: distance(coasting[i].pos_ne_m, centre), default=None)
+        if nearest is None or distance(coasting[nearest].pos_ne_m, centre) > params.gate_m:
             coasting.append(Track(centre, np.zeros(2), centre, t_s, 1))
         elif coasting[nearest].seen_t_s < t_s:
             coasting[nearest] = _corrected(coasting[nearest], centre, t_s, step_s, params)
@@ -76,7 +84,7 @@ def moving(track: Track, params: MoverParams) -> bool:
     """Has it really travelled, long and fast enough to believe its velocity?"""
     return (
         track.hits >= params.hits
-        and _distance(track.pos_ne_m, track.origin_ne_m) >= params.travel_m
+        and distance(track.pos_ne_m, track.origin_ne_m) >= params.travel_m
         and math.hypot(track.vel_ne_m_s[0], track.vel_ne_m_s[1]) >= params.slow_m_s
     )
 
@@ -103,19 +111,19 @@ def avoidable(centres_ne_m: F64, pos_ne_m: F64, radius_m: float, params: MoverPa
     return outside
 
 
-def _centres(moved_ne_m: F64, pos_ne_m: F64, params: MoverParams) -> list[F64]:
+def centres_of(moved_ne_m: F64, pos_ne_m: F64, params: MoverParams) -> list[F64]:
     """Centres of the clusters: a radius behind the visible surface."""
     clusters: list[list[F64]] = []
     for point in moved_ne_m:
-        if _distance(point, pos_ne_m) > params.range_m:
+        if distance(point, pos_ne_m) > params.range_m:
             continue
-        home = next((c for c in clusters if _distance(c[-1], point) <= params.link_m), None)
+        home = next((c for c in clusters if distance(c[-1], point) <= params.link_m), None)
         if home is None:
             clusters.append([point])
         else:
             home.append(point)
     surfaces = [np.mean(cluster, axis=0) for cluster in clusters]
-    return [s + (s - pos_ne_m) * (params.radius_m / max(_distance(s, pos_ne_m), 1e-6)) for s in surfaces]
+    return [s + (s - pos_ne_m) * (params.radius_m / max(distance(s, pos_ne_m), 1e-6)) for s in surfaces]
 
 
 def _corrected(track: Track, centre: F64, t_s: float, step_s: float, params: MoverParams) -> Track:
@@ -130,5 +138,6 @@ def _corrected(track: Track, centre: F64, t_s: float, step_s: float, params: Mov
     )
 
 
-def _distance(a: F64, b: F64) -> float:
+def distance(a: F64, b: F64) -> float:
+    """Between two places."""
     return math.hypot(float(a[0] - b[0]), float(a[1] - b[1]))

@@ -7,7 +7,7 @@ import numpy as np
 
 from companion.core.frames import yaw_rad
 from companion.core.geometry import swept_free_length
-from companion.core.gridmap import GridMap, MapParams, occupied_points, update
+from companion.core.gridmap import AZIMUTH_DIR, GridMap, MapParams, occupied_points, update
 from companion.core.inputs import Inputs
 from companion.core.params import param
 from companion.core.types import F64, VehicleState
@@ -16,6 +16,7 @@ from companion.perception.noise import entered
 from companion.perception.observation import nearest_representatives
 from companion.perception.polar import BEARING_RAD, flatten
 from companion.perception.score import local_density, safety_score
+from companion.perception.threats import follow_seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +89,12 @@ def perceive(
         grid = entered(before.grid, flat.polar, params.unbias, params.refute, map_params)
     else:
         grid = update(before.grid, flat.polar, map_params)
-    tracks = follow(before.tracks, grid.moved_ne_m, pos_ne_m, state.t_s, state.t_s - before.t_s, mover_params)
+    dt_s = state.t_s - before.t_s
+    if mover_params.again_m > 0.0:
+        seen_ne_m = AZIMUTH_DIR.take(flat.polar.hit_bin, axis=0) * flat.polar.hit_m[:, None] + pos_ne_m
+        tracks = follow_seen(before.tracks, grid.moved_ne_m, seen_ne_m, pos_ne_m, state.t_s, dt_s, mover_params)
+    else:
+        tracks = follow(before.tracks, grid.moved_ne_m, pos_ne_m, state.t_s, dt_s, mover_params)
     static, swept = occupied_points(grid, state.t_s, map_params), hazards(tracks, mover_params)
     points = static
     if len(swept):

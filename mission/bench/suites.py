@@ -68,12 +68,18 @@ FOREST_PARAMS: Final[dict[str, dict[str, Any]]] = {
         "swerve_m_s2": 6.0,
     },
 }
+# As profile 'crowd': no speed from which the vehicle would not stand before what moves can be where it is.
+YARD_PARAMS: Final[dict[str, dict[str, Any]]] = {
+    "movers": {"again_m": 0.45, "link_m": 0.5, "ahead_s": 1.5},
+    "yielding": {"ahead_s": 3.0, "weight_m": 10.0},
+}
 YARD_RULES: Final = Rules(
     speed_m_s=2.0,
     radius_m=published_sets.YARD_RADIUS_M,
     time_limit_s=60.0,
     goal_radius_m=1.0,
     range_m=4.0,
+    params=YARD_PARAMS,
 )
 TRACK_GOAL_M: Final = 1.0
 Item = TypeVar("Item")

@@ -1,7 +1,9 @@
 import math
+from importlib import resources
 
 import numpy as np
 import pytest
+import yaml
 
 from mission.bench import cells, published_sets
 from mission.bench.suites import (
@@ -77,6 +79,11 @@ def test_a_gap_is_as_wide_and_as_far_off_as_it_says():
         assert abs(middle_m) <= 5.0
         assert left[0] == right[0] == 10.0
         assert 2 * (left[3] + right[3]) + opening_m == pytest.approx(40.0)
+
+
+def test_among_what_moves_the_companion_flies_as_profile_crowd_says():
+    crowd = (resources.files("companion") / "profiles" / "crowd.yaml").read_text(encoding="utf-8")
+    assert suite_named("dynamic").cells[0].course(0).rules.params == yaml.safe_load(crowd)
 
 
 def test_the_pole_stands_six_metres_ahead_of_a_start_at_speed():
