@@ -51,7 +51,7 @@ class Tightness:
 
     since_t_s: float = -math.inf
     aside: GridMap | None = None  # where it is tight: the map of the open, as it was last; None: it is open
-    push_ne_m_s2: tuple[float, float] = (0.0, 0.0)  # of the air
+    push_ne_m_s2: tuple[float, float] = (0.0, 0.0)  # of the wind
     calm: bool = True
 
 

@@ -71,8 +71,9 @@ class TightParams:
     density_exit: float = param(0.3, "SN_TI_EXIT", "Density up to which it is open again", "", 0.0, 1.0)
     dwell_s: float = param(2.0, "SN_TI_DWELL", "Least time between two changes", "s", 0.1, 60.0)
     calm_m_s2: float = param(
-        0.35, "SN_TI_CALM", "Push of the air from which margins stay as in the open", "m/s^2", 0, 10
+        0.15, "SN_TI_CALM", "Push of the wind from which margins stay as in the open", "m/s^2", 0.0, 10.0
     )
+    drag_1_s: float = param(0.12, "SN_TI_DRAG", "Deceleration by still air at 1 m/s", "1/s", 0.0, 2.0)
 
 
 @dataclass(frozen=True, slots=True)

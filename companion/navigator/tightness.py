@@ -5,8 +5,8 @@ both, so the navigator has two: its own, and the profile that ``tight.profile`` 
 decides: tight where much is blocked near by, or where nothing that was proposed could be flown; open again where little
 is. A learned policy without a guard keeps the set that it was trained with.
 
-Centimetres are for calm air. What the air does to the vehicle is the acceleration that its tilt does not account for;
-where that is more than ``calm_m_s2``, the margins stay those of the open.
+Centimetres are for calm air. What the wind does to the vehicle is the acceleration that its tilt and its own drag do
+not account for; where that is more than ``calm_m_s2``, the margins stay those of the open.
 """
 
 import math
@@ -27,7 +27,7 @@ from companion.perception.score import local_density
 from companion.policy.expert import GeometricExpert
 
 GRAVITY_M_S2 = 9.81
-PUSH_TAU_S = 1.0  # the push of the air is averaged over
+PUSH_TAU_S = 1.0  # the push of the wind is averaged over
 STILL = 0.7  # of ``calm_m_s2``: below this it is calm again
 UPRIGHT = 0.5  # least cosine of the tilt that is reckoned with
 STUCK = (VerdictKind.ESCAPE, VerdictKind.REFUSED)
@@ -44,16 +44,16 @@ def in_force(memory: Memory, params: Params) -> Params:
 
 
 def felt(now: Tightness, before: VehicleState | None, state: VehicleState, rule: TightParams) -> Tightness:
-    """The push of the air, averaged: how the velocity changed, less what the thrust of a level flight does."""
+    """The push of the wind, averaged: how the velocity changed, less what thrust and still air do in level flight."""
     if not rule.profile or before is None or not state.t_s > before.t_s:
         return now
     dt_s = state.t_s - before.t_s
     down = rotation_ned_frd(state.q_ned_frd)[:, 2].tolist()
     share = min(dt_s / PUSH_TAU_S, 1.0)
-    gained = (state.vel_ned_m_s[:2] - before.vel_ned_m_s[:2]).tolist()
+    unaided = (state.vel_ned_m_s[:2] - before.vel_ned_m_s[:2]) / dt_s + rule.drag_1_s * state.vel_ned_m_s[:2]
     north, east = (
-        old + share * (dv / dt_s + GRAVITY_M_S2 * axis / max(down[2], UPRIGHT) - old)
-        for old, dv, axis in zip(now.push_ne_m_s2, gained, down[:2], strict=True)
+        old + share * (acc + GRAVITY_M_S2 * axis / max(down[2], UPRIGHT) - old)
+        for old, acc, axis in zip(now.push_ne_m_s2, unaided.tolist(), down[:2], strict=True)
     )
     calm = math.hypot(north, east) < rule.calm_m_s2 * (1.0 if now.calm else STILL)
     return replace(now, push_ne_m_s2=(north, east), calm=calm)

@@ -108,8 +108,18 @@ def _command(entry: Flown) -> str:
 def _made(entries: list[Flown]) -> str:
     commits = sorted({row.commit for entry in entries for row in entry.rows})
     dates = sorted({entry.setup["date"] for entry in entries})
-    machines = sorted({entry.setup["machine"] for entry in entries})
-    return f"Flown {', '.join(dates)}, commit {', '.join(commits)}, {'; '.join(machines)}."
+    machines = _machines([entry.setup["machine"] for entry in entries])
+    return f"Flown {', '.join(dates)}, commit {', '.join(commits)}, {machines}."
+
+
+def _machines(told: list[str]) -> str:
+    """Each machine once, with the range of its loads (``run.machine``)."""
+    loads: dict[tuple[str, str], list[float]] = {}
+    for text in told:
+        machine, _, rest = text.partition(", load ")
+        load, _, cores = rest.partition(" ")
+        loads.setdefault((machine, cores), []).append(float(load))
+    return "; ".join(f"{who}, load {min(seen):g} to {max(seen):g} {cores}" for (who, cores), seen in loads.items())
 
 
 def _table(entries: list[Flown], scored: bool) -> list[str]:

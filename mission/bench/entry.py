@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from companion import navigator
-from companion.navigator.profiles import profile_named
 from companion.core import params as core_params
+from companion.navigator.profiles import profile_named
 from companion.policy.store import digest_of, shipped
 from mission.bench.course import Course
 from mission.bench.flight import End, Flown, fly

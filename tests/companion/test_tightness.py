@@ -2,6 +2,8 @@
 
 import itertools
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from companion.core.types import AutopilotStatus, VehicleState
 from companion.navigator.memory import Tightness
 from companion.navigator.profiles import profile_named
 from companion.navigator.tightness import GRAVITY_M_S2, felt, tight_set
-from mission.mission_file import load_mission
+from mission.mission_file import WindSpec, load_mission
 from mission.simulate import fly_in_process
 from mission.training.flights import plan_world
 from sitl.simulation import Simulation
@@ -25,7 +27,7 @@ from sitl.world import World
 BOTH = update(PARAMS, {"tight": {"profile": "tight"}})
 OPEN, CLOSE = Eye(world([(6.0, 5.0, 0.3)])), Eye(world(ring(1.2)))
 DWELL_TICKS = 51  # of 40 ms: a little more than 2 s
-CALM_SEED = 3  # 1.4 m/s of wind
+CALM = {"wind": WindSpec(mean_m_s=(0.0, 0.0), turbulence="none")}
 
 
 def is_tight(pilot: Pilot) -> bool:
@@ -130,17 +132,28 @@ def test_the_other_set_is_the_profile_on_top_of_ones_own() -> None:
         (0.0, 0.5, 0.5),
     ],
 )
-def test_the_push_of_the_air_is_what_the_tilt_does_not_account_for(
+def test_the_push_of_the_wind_is_what_the_tilt_does_not_account_for(
     tilt_rad: float, acc_m_s2: float, push_m_s2: float
 ) -> None:
+    rule = replace(BOTH.tight, drag_1_s=0.0)
     now, before = Tightness(), None
     for tick in range(250):
         t_s = 1.0 + 0.04 * tick
         vel = np.array([acc_m_s2 * t_s, 0.0, 0.0])
         state = VehicleState(t_s, np.zeros(3), vel, quaternion(0.0, tilt_rad, 0.0), np.zeros(3))
-        now, before = felt(now, before, state, BOTH.tight), state
+        now, before = felt(now, before, state, rule), state
     assert now.push_ne_m_s2 == pytest.approx((push_m_s2, 0.0), abs=1e-3)
     assert now.calm is (abs(push_m_s2) < BOTH.tight.calm_m_s2)
+
+
+def test_still_air_pushes_nobody() -> None:
+    vel = np.array([2.0, 0.0, 0.0])
+    tilt_rad = -math.atan(BOTH.tight.drag_1_s * 2.0 / GRAVITY_M_S2)  # holds the speed against the drag
+    now, before = Tightness(), None
+    for tick in range(250):
+        state = VehicleState(1.0 + 0.04 * tick, np.zeros(3), vel, quaternion(0.0, tilt_rad, 0.0), np.zeros(3))
+        now, before = felt(now, before, state, BOTH.tight), state
+    assert now.push_ne_m_s2 == pytest.approx((0.0, 0.0), abs=1e-9) and now.calm
 
 
 def test_in_wind_the_margins_stay_those_of_the_open() -> None:
@@ -150,17 +163,23 @@ def test_in_wind_the_margins_stay_those_of_the_open() -> None:
     assert (windy.expert.margin_m, windy.expert.tight_m) == (PARAMS.expert.margin_m, PARAMS.expert.tight_m)
 
 
-def gap_flown(profile: str, seed: int, wide_m: float) -> Simulation:
+def gap_flown(profile: str, wide_m: float, seed: int, conditions: dict[str, Any]) -> Simulation:
     """Through a wall with one gap, or not."""
     half = 12.0
     walls = [(6.0, side * (wide_m / 2 + half), math.pi / 2, half, 0.1, math.inf) for side in (-1, 1)]
     bounds = (-4.0, -6.0, 16.0, 6.0)
     world = World("gap", np.zeros(2), np.array([12.0, 0.0]), bounds, np.empty((0, 4)), np.array(walls))
+    mission = load_mission("forest").model_copy(update=conditions)
     overrides = {"tight": {"profile": profile}, "policy": {"name": "geometric"}}
-    return fly_in_process(plan_world(load_mission("forest"), world, seed, overrides), lambda record: None).sim
+    return fly_in_process(plan_world(mission, world, seed, overrides), lambda record: None).sim
 
 
 def test_a_gap_too_narrow_for_the_defaults_is_flown_in_calm_air_with_both_sets_and_not_with_one() -> None:
     for profile, passes in (("tight", True), ("", False)):
-        sim = gap_flown(profile, CALM_SEED, 0.76)
+        sim = gap_flown(profile, 0.76, 1, CALM)
         assert not sim.contact and bool(sim.truth.pos_ned_m[0] > 6.5) is passes
+
+
+def test_in_wind_the_vehicle_stays_out_of_that_gap() -> None:
+    sim = gap_flown("tight", 0.76, 1, {})  # 2.9 m/s, light turbulence
+    assert not sim.contact and sim.truth.pos_ned_m[0] < 6.0
