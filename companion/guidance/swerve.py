@@ -15,7 +15,7 @@ from companion.core.frames import wrap_rad
 from companion.core.types import F64, Setpoint, VehicleState
 from companion.guidance.limits import LimitsParams, stopping_distance
 
-LEAST_M_S = 2.0  # slower than this, braking is as quick
+LEAST_M_S = 3.0  # slower than this, braking is quicker than to step aside by a trunk's radius and the hull's
 TURN_MAX_RAD = math.radians(60.0)  # farther round than this, brake
 TURNS_RAD = np.radians([10.0, 20.0, 30.0, 40.0, 50.0])
 ARC_PIECES = 5

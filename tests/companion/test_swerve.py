@@ -35,6 +35,11 @@ def test_what_is_too_near_to_stop_for_is_passed_on_the_side_with_more_room() -> 
         assert swerve is not None and swerve.side == side
 
 
+def test_a_stop_from_three_metres_a_second_is_not_given_up_for_a_swerve() -> None:
+    assert begun(pole(1.2, 0.1, radius_m=0.3), speed_m_s=2.9) is None
+    assert begun(pole(1.6, 0.1, radius_m=0.3), speed_m_s=3.1) is not None
+
+
 def test_by_default_nothing_is_swerved_for() -> None:
     assert turn_aside(None, flying(7.0), pole(5.8, 0.2), RADIUS_M, None, LimitsParams()) is None
 
