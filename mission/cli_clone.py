@@ -1,8 +1,9 @@
 """``swiftnav clone``: a policy that learns a teacher's ways by flying itself; resumable at any moment."""
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,28 +12,30 @@ from mission.cli_options import Json, print_json, refuse_beside_resume, require_
 if TYPE_CHECKING:
     from mission.training.dagger import Standing
 
+PresetName = Annotated[str, typer.Option("--preset", help="Settings that the other options change: forest, tight.")]
 World = Annotated[str | None, typer.Option(help="A mission's world, a world file, or KIND[:SPLIT[:COUNT]].")]
-TeacherName = Annotated[str, typer.Option("--teacher", help="geometric: the expert; map: who knows the true map.")]
-Observation = Annotated[str, typer.Option(help="What the policy sees: map, corridors, goal or paper.")]
-Rounds = Annotated[int, typer.Option(min=1, max=100, help="Of flying and cloning.")]
-Flights = Annotated[int, typer.Option(min=1, max=100_000, help="Of a round.")]
-Steps = Annotated[int, typer.Option(min=1, help="Of a cloning.")]
-Seed = Annotated[int, typer.Option("--seed", min=0, max=2**31, help="Of worlds, flights and weights.")]
+TeacherName = Annotated[str | None, typer.Option("--teacher", help="geometric: the expert; map: who knows the map.")]
+Observation = Annotated[str | None, typer.Option(help="What the policy sees: map, corridors, goal, ...")]
+Rounds = Annotated[int | None, typer.Option(min=1, max=100, help="Of flying and cloning.")]
+Flights = Annotated[int | None, typer.Option(min=1, max=100_000, help="Of a round.")]
+Steps = Annotated[int | None, typer.Option(min=1, help="Of a cloning.")]
+Seed = Annotated[int | None, typer.Option("--seed", min=0, max=2**31, help="Of worlds, flights and weights.")]
 Out = Annotated[Path | None, typer.Option(help="Run folder, new or empty; default below ./runs.")]
 Resume = Annotated[Path | None, typer.Option(metavar="DIR", help="Go on with this run; its own settings hold.")]
 
-DEFAULT_WORLD = "mixed:train"
+DEFAULT = "forest"
 
 
 def clone(
     context: typer.Context,
+    preset: PresetName = DEFAULT,
     world: World = None,
-    teacher: TeacherName = "geometric",
-    observation: Observation = "map",
-    rounds: Rounds = 5,
-    flights: Flights = 40,
-    steps: Steps = 4000,
-    seed: Seed = 1,
+    teacher: TeacherName = None,
+    observation: Observation = None,
+    rounds: Rounds = None,
+    flights: Flights = None,
+    steps: Steps = None,
+    seed: Seed = None,
     out: Out = None,
     resume: Resume = None,
     json: Json = False,
@@ -40,22 +43,23 @@ def clone(
     """Learn a teacher's ways by DAgger: fly, be told at each decision what it would do, clone, repeat."""
     require_extra("train", "clone")
     from mission.training.dagger import run
-    from mission.training.dagger_config import DaggerConfig, read_config, write_config
+    from mission.training.dagger_config import clone_preset, read_config, write_config
     from mission.training.training_worlds import world_source
 
     if resume is not None:
         refuse_beside_resume(context, "json")
         folder, config = resume, read_config(resume)
     else:
-        config = DaggerConfig(
-            world=world or DEFAULT_WORLD,
-            teacher=teacher,
-            observation=observation,
-            rounds=rounds,
-            flights=flights,
-            steps=steps,
-            seed=seed,
-        )
+        asked: dict[str, Any] = {
+            "world": world,
+            "teacher": teacher,
+            "observation": observation,
+            "rounds": rounds,
+            "flights": flights,
+            "steps": steps,
+            "seed": seed,
+        }
+        config = replace(clone_preset(preset), **{key: value for key, value in asked.items() if value is not None})
         world_source(config.world)  # a mistake is told before a folder is there
         folder = out or Path("runs") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}_clone"
         write_config(config, folder)

@@ -15,10 +15,13 @@ from companion.policy.interface import Proposal, Query
 HEADINGS = 41
 NEXT_HEADINGS = 13  # behind the best
 ASIDE = (0.0, 1.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0, -2.0 / 3.0)  # of the step between headings: gaps are narrower than it
-NEXT_CHOICES = 2 * len(ASIDE) - 1 + NEXT_HEADINGS
+LENGTHS = (1.0, SHORT, SHORT * SHORT)  # shares of the length: as far as the gap's mouth, where the whole does not fit
+NEXT_CHOICES = len(LENGTHS) * len(ASIDE) - 1 + NEXT_HEADINGS
+AGAINST = 4.0  # nats: a heading that much less likely than the best is no choice; rather through at less margin
+STEADY = 5.0  # nats against turning back: without, flights swung to and fro before what they could not pass
 LASTS_S = 0.8  # a straight path is replaced after this long: at 0.4 s flights were as long, at 3 s a tenth longer
-SHORTEST_M = 1.0  # chord of a teacher's path that its heading is read from, at least
-STEP_M = 0.25
+SHORTEST = 1.0 / 4.0  # of the length: chord of a teacher's path that its heading is read from, at least
+STEP = 1.0 / 16.0  # of the length: by which chords are shortened, and how far they may leave the path
 
 
 def headings_rad(params: DecoderParams) -> F64:
@@ -29,15 +32,24 @@ def headings_rad(params: DecoderParams) -> F64:
 def ranked(logits: F64, query: Query, params: DecoderParams) -> tuple[Proposal, float]:
     """Straight paths along the best heading, refined; close by it, shorter, along the next ones; and that heading."""
     headings = headings_rad(params)
-    order = np.argsort(-logits, kind="stable")[: NEXT_HEADINGS + 1].tolist()
-    best = refined(logits, order[0], headings)
+    order = np.argsort(-logits, kind="stable")[: NEXT_HEADINGS + 1]
+    order = order[logits[order] >= logits[order[0]] - AGAINST]
+    best = refined(logits, int(order[0]), headings)
     close_by = [best + share * float(headings[1] - headings[0]) for share in ASIDE]
-    whole_m, next_best = params.headings_m, headings[order[1:]].tolist()
-    choices = [(heading, length_m) for length_m in (whole_m, SHORT * whole_m) for heading in close_by]
-    choices += [(heading, whole_m) for heading in next_best]
+    whole_m = params.headings_m
+    choices = [(heading, share * whole_m) for share in LENGTHS for heading in close_by]
+    choices += [(heading, whole_m) for heading in headings[order[1:]].tolist()]
     paths = [arc(heading, 0.0, length_m, query, params) for heading, length_m in choices]
     first, *others = (joined(query, path) for path in paths)
     return Proposal(first, tuple(others), LASTS_S), best
+
+
+def steadied(logits: F64, last_rad: float | None, params: DecoderParams) -> F64:
+    """The ranking with a bias towards the last heading, both off the goal bearing: turning back wants to be surer."""
+    if last_rad is None:
+        return logits
+    steady: F64 = logits - STEADY * (1.0 - np.cos(headings_rad(params) - last_rad)) / 2.0
+    return steady
 
 
 def refined(logits: F64, best: int, headings: F64) -> float:
@@ -51,18 +63,18 @@ def refined(logits: F64, best: int, headings: F64) -> float:
     return heading + share * float(headings[1] - headings[0])
 
 
-def encode_heading(path_ne_m: F64, query: Query, params: DecoderParams, tolerance_m: float = 0.25) -> float:
+def encode_heading(path_ne_m: F64, query: Query, params: DecoderParams) -> float:
     """Heading off the goal bearing of the longest chord of a teacher's path, from the anchor, that stays near the path.
 
     Args: as of ``encode_detour``.
     """
     rest = goal_frame(query).from_ne(beyond_anchor(path_ne_m, query))
-    length_m = min(params.headings_m, geometry.length(rest))
-    while length_m - STEP_M >= SHORTEST_M:
+    length_m, step_m = min(params.headings_m, geometry.length(rest)), STEP * params.headings_m
+    while length_m - step_m >= SHORTEST * params.headings_m:
         part = geometry.part(rest, 0.0, length_m)
-        if geometry.points_to_polyline_distance(part[[0, -1]], part).max() <= tolerance_m:
+        if geometry.points_to_polyline_distance(part[[0, -1]], part).max() <= step_m:
             break
-        length_m -= STEP_M
+        length_m -= step_m
     end = geometry.point_at(rest, length_m)
     return float(np.clip(np.arctan2(end[1], end[0]), -params.side_rad, params.side_rad))
 

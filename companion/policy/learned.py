@@ -15,7 +15,7 @@ from companion.policy.actor import Actor, squashed
 from companion.policy.decoder import ACTION_SIZE, SIDE, TURN, DecoderParams
 from companion.policy.goal_frame import goal_frame
 from companion.policy.interface import Proposal, Query
-from companion.policy.observations import observe, remember
+from companion.policy.observations import last_heading_rad, observe, remember
 
 HEADS = {"continuous": ACTION_SIZE, "headings": headings.HEADINGS}  # name: outputs of the actor
 
@@ -46,6 +46,7 @@ class LearnedPolicy:
         if not np.isfinite(output).all():
             return None, memory
         if self.spec.head == "headings":
+            output = headings.steadied(output, last_heading_rad(query, memory), self.spec.decoder_params)
             proposal, heading_rad = headings.ranked(output, query, self.spec.decoder_params)
             return proposal, remember(query, memory, heading_rad, 0.0)
         return act(squashed(output), query, memory, self.spec)

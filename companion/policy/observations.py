@@ -49,6 +49,12 @@ def remember(query: Query, memory: F64 | None, heading_rad: float, turn: float) 
     return recollection.decided(recollection.entered(query, memory), goal_frame(query).course_rad + heading_rad, turn)
 
 
+def last_heading_rad(query: Query, memory: F64 | None) -> float | None:
+    """The heading off the goal bearing that was chosen last; None before the first."""
+    course_rad = None if memory is None else recollection.last_course_rad(memory)
+    return None if course_rad is None else course_rad - goal_frame(query).course_rad
+
+
 def mirror_observation(name: str, observation: F64) -> F64:
     """The observation (..., size) of the mirror image."""
     if name in ("goal", "paper"):

@@ -49,6 +49,11 @@ def decided(memory: F64, course_rad: float, turn: float) -> F64:
     return memory
 
 
+def last_course_rad(memory: F64) -> float | None:
+    """Course over ground that was decided last; None before the first decision."""
+    return float(memory[COURSE]) if memory[DECIDED] else None
+
+
 def features(query: Query, memory: F64, frame: GoalFrame) -> F64:
     """(14,) numbers of order one in the goal frame.
 

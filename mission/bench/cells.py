@@ -51,14 +51,19 @@ def generate(seed: int) -> World:
     """The world of a seed. Raises WorldError where no way leads through it."""
     rng = np.random.default_rng(seed)
     fill, iterations = FILLS[seed % len(FILLS)], ITERATIONS[seed // len(FILLS) % len(ITERATIONS)]
-    filled = rng.uniform(size=(SIDE, SIDE)) < fill
-    for _ in range(iterations):
-        filled = smoothed(filled)
-    places = np.concatenate([_field(filled), _box()])
+    places = cylinders(rng, fill, iterations)
     circles = np.column_stack([places, np.full(len(places), CYLINDER_M), np.full(len(places), np.inf)])
     world = World(f"cells_{seed}", np.array(START), np.array(GOAL), FIELD, circles, np.empty((0, 6)))
     check_world(world, RULES.radius_m, SPARE_M, FINE_M)
     return World(world.name, world.start_ned_m, world.goal_ned_m, BOUNDS, circles, world.boxes)
+
+
+def cylinders(rng: np.random.Generator, fill: float, iterations: int) -> F64:
+    """Where they stand (k, 2): a field that was drawn so full and smoothed so often, and the box before it."""
+    filled = rng.uniform(size=(SIDE, SIDE)) < fill
+    for _ in range(iterations):
+        filled = smoothed(filled)
+    return np.concatenate([_field(filled), _box()])
 
 
 def smoothed(filled: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -26,7 +26,7 @@ from companion.policy import headings
 from companion.policy.actor import Actor
 from companion.policy.decoder import DecoderParams
 from companion.policy.learned import PolicySpec
-from companion.policy.observations import SIZES, observe, remember
+from companion.policy.observations import SIZES, last_heading_rad, observe, remember
 from companion.policy.store import Card, read_policy, save_policy
 from mission.errors import InputError
 from mission.training import bc
@@ -70,17 +70,18 @@ class _Steering:
     spec: PolicySpec
     expert_share: float
     random_share: float
+    sigma_rad: float
     rng: np.random.Generator
 
-    def logits(self, seen: F64, taught_rad: float) -> F64:
-        """A ranking of the headings."""
+    def logits(self, seen: F64, taught_rad: float, last_rad: float | None) -> F64:
+        """A ranking of the headings; ``last_rad``: the one decided last, off the goal bearing."""
         draw = self.rng.uniform()
         params = self.spec.decoder_params
         if draw < self.random_share:
-            return _peak(float(self.rng.uniform(-params.side_rad, params.side_rad)), params)
+            return _peak(float(self.rng.uniform(-params.side_rad, params.side_rad)), self.sigma_rad, params)
         if self.actor is None or draw < self.random_share + self.expert_share:
-            return _peak(taught_rad, params)
-        return self.actor.forward(seen)
+            return _peak(taught_rad, self.sigma_rad, params)
+        return headings.steadied(self.actor.forward(seen), last_rad, params)
 
 
 def run(config: DaggerConfig, folder: Path, shown: Callable[[Standing], None]) -> Clone:
@@ -113,7 +114,7 @@ def flown(config: DaggerConfig, number: int, index: int, actor: Actor | None, so
     env = drawn(config, rng)
     params = navigator_params(env)
     spec = config.policy_spec()
-    steering = _Steering(actor, spec, config.share_of_expert(number), config.random_share, rng)
+    steering = _Steering(actor, spec, config.share_of_expert(number), config.random_share, config.sigma_rad, rng)
     episode = Episode(flight_spec(source.draw(rng), int(rng.integers(2**31)), env, params))
     return _taught(episode, steering, _teacher(config, episode, params), params)
 
@@ -127,7 +128,10 @@ def drawn(config: DaggerConfig, rng: np.random.Generator) -> EnvConfig:
         latency_s=float(rng.uniform(*config.latency_s)),
         scan_latency_s=float(rng.uniform(*config.scan_latency_s)),
         wind_m_s=config.wind_m_s,
+        spawn_jitter_m=config.spawn_jitter_m,
+        cruise_m_s=config.cruise_m_s,
         time_limit_s=config.time_limit_s,
+        params=config.params(),
     )
 
 
@@ -158,7 +162,8 @@ def _taught(episode: Episode, steering: _Steering, teacher: Teacher, params: Par
             episode.decide(None, memory)
             continue
         seen = observe(spec.observation, query, memory, params.map)
-        proposal, heading_rad = headings.ranked(steering.logits(seen, taught.heading_rad), query, spec.decoder_params)
+        logits = steering.logits(seen, taught.heading_rad, last_heading_rad(query, memory))
+        proposal, heading_rad = headings.ranked(logits, query, spec.decoder_params)
         seen_all.append(seen)
         labels_all.append(taught.labels)
         memory = remember(query, memory, heading_rad, 0.0)
@@ -214,7 +219,7 @@ def _cloned(config: DaggerConfig, number: int, lessons: list[Lesson], folder: Pa
     return result
 
 
-def _peak(heading_rad: float, params: DecoderParams) -> F64:
-    """A ranking whose best is this heading."""
-    away: F64 = headings.headings_rad(params) - heading_rad
-    return -away * away
+def _peak(heading_rad: float, sigma_rad: float, params: DecoderParams) -> F64:
+    """A ranking whose best is this heading, as it is taught."""
+    away: F64 = (headings.headings_rad(params) - heading_rad) / sigma_rad
+    return -0.5 * away * away

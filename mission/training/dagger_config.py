@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from companion.core.params import nearest
+from companion.navigator.profiles import profile_named, profile_names
 from companion.policy import observations
 from companion.policy.decoder import DecoderParams
 from companion.policy.learned import PolicySpec
@@ -12,6 +14,7 @@ from mission.strict_yaml import read_yaml, write_yaml
 from mission.training.configure import configured, plain
 
 FILE = "dagger.yaml"
+PRESETS = Path(__file__).parent / "clones"
 TEACHERS = ("geometric", "map")
 Span = tuple[float, float]  # a flight draws uniformly from it
 
@@ -22,6 +25,10 @@ class DaggerConfig:
 
     name: str = "forest"  # of the policy
     world: str = "mixed:train"  # see ``world_source``
+    profile: str | None = None  # of the companion's parameters; None: the defaults
+    cruise_m_s: float = 3.0
+    spawn_jitter_m: float = 2.0
+    headings_m: float = 4.0  # length of a path
     teacher: str = "geometric"  # the expert; or ``map``: who knows the true map, see ``map_teacher``
     observation: str = "map"  # see ``companion.policy.observations``
     hidden: tuple[int, ...] = (256, 256)
@@ -55,14 +62,34 @@ class DaggerConfig:
                 raise InputError(f"a share of {share} is outside [0, 1]")
         if not self.expert_share:
             raise InputError("expert_share wants one number a round; the last one holds on")
+        if not 0.2 <= self.headings_m <= 20.0:
+            raise InputError(f"headings_m = {self.headings_m} is outside [0.2, 20]")
+        if self.profile is not None and self.profile not in profile_names():
+            raise InputError(f"unknown profile '{self.profile}'{nearest(self.profile, profile_names())}")
+
+    def params(self) -> dict[str, dict[str, Any]]:
+        """Overrides of the companion's parameters."""
+        return {} if self.profile is None else profile_named(self.profile)
 
     def policy_spec(self) -> PolicySpec:
         """What the numbers of the policy mean."""
-        return PolicySpec(self.observation, head="headings", decoder_params=DecoderParams())
+        return PolicySpec(self.observation, head="headings", decoder_params=DecoderParams(headings_m=self.headings_m))
 
     def share_of_expert(self, number: int) -> float:
         """Share of decisions that the teacher steers in a round, from 0."""
         return self.expert_share[min(number, len(self.expert_share) - 1)]
+
+
+def clone_presets() -> list[str]:
+    """Names that ``clone_preset`` knows."""
+    return sorted(path.stem for path in PRESETS.glob("*.yaml"))
+
+
+def clone_preset(name: str) -> DaggerConfig:
+    """The settings of that name. Raises InputError."""
+    if name not in clone_presets():
+        raise InputError(f"unknown preset '{name}'{nearest(name, clone_presets())}")
+    return configured(DaggerConfig, read_yaml(PRESETS / f"{name}.yaml"), f"preset {name}")
 
 
 def write_config(config: DaggerConfig, folder: Path) -> None:

@@ -6,7 +6,7 @@ same command writes the same figures again, wall times aside.
 
 import dataclasses
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,9 +27,12 @@ WORLDS = (
     "forest04", "forest08", "forest12", "forest15", "barrier", "deep", "two", "t2like", "pocket",
 )  # fmt: skip
 LIMITS = (
-    "Trained and tested at 3 m/s cruise, 72 sectors of 5 deg, standing obstacles, winds up to 6 m/s; nothing else.",
     "Alone (guard off) it may circle in front of what it cannot pass until the time is over; the guard ends that.",
     "Alone it flies slower than the expert.",
+)
+OPEN = "Trained and tested at 3 m/s cruise, 72 sectors of 5 deg, standing obstacles, winds up to 6 m/s; nothing else."
+PROFILED = (
+    "Trained and tested with the profile '{}' at {:g} m/s cruise, 72 sectors of 5 deg, in still air; nothing else."
 )
 GUARD_OFF = "guard_off"
 
@@ -59,7 +62,9 @@ def ship_clone(shipment: CloneShipment, tell: Callable[[int, int], None]) -> dic
     try:
         target = shipment.into / shipment.name
         save_policy(
-            target, actor, replace(card, name=shipment.name, training=training, evaluation=evaluation, limits=LIMITS)
+            target,
+            actor,
+            replace(card, name=shipment.name, training=training, evaluation=evaluation, limits=_limits(training)),
         )
     except OSError as error:
         raise FlightError(f"{shipment.into / shipment.name}: {error.strerror or error}") from error
@@ -73,6 +78,12 @@ def arms(policy: str, world: str) -> dict[str, EvalSpec]:
         "guard_on": EvalSpec(policy, world, guard=True),
         GeometricExpert.name: EvalSpec(GeometricExpert.name, world),
     }
+
+
+def _limits(training: Mapping[str, Any]) -> tuple[str, ...]:
+    """What it is not good for, by the settings of its training."""
+    profile = training.get("profile")
+    return (OPEN if profile is None else PROFILED.format(profile, training["cruise_m_s"]), *LIMITS)
 
 
 def _learned(run: Path) -> Path:

@@ -88,6 +88,11 @@ def pocket(rng: np.random.Generator) -> Site:
     return _sparsely_wooded(site, rng)
 
 
+def cellular(rng: np.random.Generator) -> Site:
+    """A field of 4.5 m full of cylinders by a cellular automaton, a walled box before it: gaps of 0.7 m and wider."""
+    return parts.with_cells(parts.box_and_field(), rng)
+
+
 def mixed(rng: np.random.Generator) -> Site:
     """What the forest policy is trained on."""
     draw = [kind for kind, _ in MIXTURE][rng.choice(len(MIXTURE), p=[share for _, share in MIXTURE])]
@@ -110,9 +115,11 @@ KINDS: dict[str, Callable[[np.random.Generator], Site]] = {
     "rows": rows,
     "t2like": t2like,
     "pocket": pocket,
+    "cellular": cellular,
     "mixed": mixed,
     **{f"forest{round(100 * density):02d}": partial(trunks, density) for density in TABLE_PER_M2},
 }
+TIGHT_KINDS = ("cellular",)  # under BARN's rules
 
 
 def random_world(kind: str, split: str, index: int, radius_m: float = RADIUS_M) -> World:
@@ -126,9 +133,10 @@ def random_world(kind: str, split: str, index: int, radius_m: float = RADIUS_M) 
     seed = SPLITS.index(split) * SPLIT_SIZE + index
     rng = np.random.default_rng([seed, *kind.encode()])
     for _ in range(TRIES):
-        world = KINDS[kind](rng).world(f"{kind}_{split}_{index}")
+        site = KINDS[kind](rng)
+        world = site.world(f"{kind}_{split}_{index}")
         try:
-            check_world(world, radius_m)
+            check_world(world, radius_m, site.spare_m, site.search_m)
         except WorldError:
             continue
         return world

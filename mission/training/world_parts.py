@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from companion.core.types import F64
+from mission.bench import barn, cells
+from mission.world_check import CELL_M, MARGIN_M
 from sitl.world import World, arc_boxes, wall_box
 
 KEEP_CLEAR_M = 2.0  # round start and goal
@@ -28,6 +30,8 @@ class Site:
     bounds_m: tuple[float, float, float, float]  # north min, east min, north max, east max
     circles: tuple[Circle, ...] = ()
     boxes: tuple[Box, ...] = ()
+    spare_m: float = MARGIN_M  # of the narrowest way, to either side
+    search_m: float = CELL_M  # cells in which a way is looked for
 
     def world(self, name: str) -> World:
         """Finished; everything is taller than any flight."""
@@ -62,6 +66,20 @@ def garden() -> Site:
     corners = [(-4.0, -12.0), (61.0, -12.0), (61.0, 12.0), (-4.0, 12.0)]
     sides = zip(corners, corners[1:] + corners[:1], strict=True)
     return Site(56.0, (-5.0, -13.0, 62.0, 13.0), boxes=tuple(wall_box(a, b, FENCE_M, math.inf) for a, b in sides))
+
+
+def box_and_field() -> Site:
+    """Ground of BARN's measures with nothing on it; a way is a few centimetres wider than the vehicle."""
+    (south_m, west_m, north_m, east_m), (start_m, middle_m) = barn.BOUNDS, barn.START
+    bounds_m = (south_m - start_m, west_m - middle_m, north_m - start_m, east_m - middle_m)
+    return Site(barn.GOAL[0] - start_m, bounds_m, spare_m=cells.SPARE_M, search_m=barn.FINE_M)
+
+
+def with_cells(site: Site, rng: np.random.Generator) -> Site:
+    """The field and the box before it, as ``bench heldout`` has them."""
+    places = cells.cylinders(rng, float(rng.choice(cells.FILLS)), int(rng.choice(cells.ITERATIONS)))
+    circles = tuple((north_m, east_m, cells.CYLINDER_M) for north_m, east_m in (places - barn.START).tolist())
+    return replace(site, circles=site.circles + circles)
 
 
 def with_trees(site: Site, rng: np.random.Generator, density_per_m2: float, radius_m: tuple[float, float]) -> Site:

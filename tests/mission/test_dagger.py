@@ -9,8 +9,8 @@ import pytest
 from companion.policy.headings import HEADINGS, headings_rad
 from companion.policy.store import read_policy
 from mission.errors import InputError
-from mission.training.dagger import Standing, run
-from mission.training.dagger_config import DaggerConfig, read_config, write_config
+from mission.training.dagger import Standing, drawn, run
+from mission.training.dagger_config import DaggerConfig, clone_preset, clone_presets, read_config, write_config
 from mission.training.env_config import EnvConfig, flight_spec, navigator_params
 from mission.training.episode import Episode
 from mission.training.teachers import ExpertTeacher, MapTeacher
@@ -71,6 +71,15 @@ def test_the_expert_teaches_the_heading_of_its_path_and_who_knows_the_map_the_qu
     assert np.isinf(cost_s).any() and cost_s[np.isfinite(cost_s)].min() > 20.0 / config.cruise_m_s
 
 
+def test_the_presets_are_whole_and_tight_flies_with_its_profile() -> None:
+    assert clone_presets() == ["forest", "tight"]
+    assert clone_preset("forest") == DaggerConfig()
+    params = navigator_params(drawn(clone_preset("tight"), np.random.default_rng(1)))
+    assert (params.map.cell_m, params.map.sense_m, params.policy.guard) == (0.05, 4.0, False)
+    with pytest.raises(InputError, match="did you mean 'tight'"):
+        clone_preset("tigth")
+
+
 def test_the_teachers_share_of_the_last_round_holds_on() -> None:
     shares = [BRIEF.share_of_expert(number) for number in range(4)]
     assert shares == [1.0, 0.0, 0.0, 0.0]
@@ -93,6 +102,8 @@ def test_a_run_keeps_its_settings_and_a_folder_in_use_is_refused(tmp_path: Path)
         ({"rounds": 0}, "rounds = 0"),
         ({"random_share": 1.5}, "share of 1.5"),
         ({"expert_share": ()}, "one number a round"),
+        ({"headings_m": 0.0}, "headings_m = 0.0"),
+        ({"profile": "tigth"}, "did you mean 'tight'"),
     ],
 )
 def test_settings_out_of_range_are_named(change: dict[str, object], told: str) -> None:

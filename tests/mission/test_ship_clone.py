@@ -1,5 +1,6 @@
 """A clone that ships: its card, and that no flight is flown twice."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -46,7 +47,18 @@ def test_a_card_tells_every_world_guard_off_and_on_beside_the_expert(
     card, _ = read_policy(tmp_path / "policies" / "forest")
     assert card.evaluation["pocket"]["guard_on"]["success"] == 1.0
     assert card.evaluation["pocket"]["guard_off"]["success"] == 0.0
-    assert card.limits
+    assert "3 m/s" in card.limits[0]
+
+
+def test_a_card_names_the_profile_that_was_trained_with(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    card, actor = read_policy(run / "round-0")
+    save_policy(run / "round-0", actor, replace(card, training={"profile": "tight", "cruise_m_s": 2.0}))
+    monkeypatch.setattr(module, "fly_one", flight)
+    ship_clone(CloneShipment(run, "tight", ("cellular",), 1, 1, 7, tmp_path / "out"), lambda *_: None)
+    card, _ = read_policy(tmp_path / "out" / "tight")
+    assert "'tight' at 2 m/s" in card.limits[0]
 
 
 def test_a_seed_that_was_trained_ships_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

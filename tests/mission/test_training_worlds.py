@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mission.bench.barn import FINE_M
+from mission.bench.cells import SPARE_M, generate, held_out
 from mission.errors import InputError
 from mission.shortest_path import shortest_path_m
 from mission.training.path_ratio import shortest_from
@@ -16,12 +18,13 @@ from mission.training.training_worlds import (
     KINDS,
     SPLIT_SIZE,
     SPLITS,
+    TIGHT_KINDS,
     FewWorlds,
     RandomWorlds,
     random_world,
     world_source,
 )
-from mission.world_check import check_world, clearance_m
+from mission.world_check import RADIUS_M, check_world, clearance_m
 from mission.world_file import load_world, world_hash
 from mission.world_generator import forest100, generate_forest
 from sitl.world import World
@@ -40,11 +43,11 @@ def barred_share(world: World) -> float:
 @given(index=st.integers(0, SPLIT_SIZE - 1), split=st.sampled_from(SPLITS))
 def test_a_world_belongs_to_kind_split_and_index_and_can_be_flown(kind: str, index: int, split: str) -> None:
     world = random_world(kind, split, index)
-    check_world(world)
+    check_world(world, RADIUS_M, *((SPARE_M, FINE_M) if kind in TIGHT_KINDS else ()))
     assert world_hash(world) == world_hash(random_world(kind, split, index))
     ends = np.array([world.start_ned_m, world.goal_ned_m])
     assert (clearance_m(world, ends) >= 0.38).all()
-    assert math.dist(*ends.tolist()) > 50.0
+    assert math.dist(*ends.tolist()) >= (10.0 if kind in TIGHT_KINDS else 50.0)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -57,6 +60,16 @@ def test_no_training_forest_is_one_of_the_frozen_hundred() -> None:
     seeds = forest100().seeds[:10]
     frozen = {world_hash(generate_forest(seed)) for seed in seeds}
     assert frozen.isdisjoint(world_hash(random_world("forest", "train", seed)) for seed in seeds)
+
+
+def test_a_cellular_world_has_barns_measures_and_is_none_of_those_held_out() -> None:
+    world = random_world("cellular", "train", 0)
+    assert world.goal_ned_m.tolist() == [10.0, 0.0] and world.inside(*world.goal_ned_m)
+    places = {tuple(place) for place in np.round(world.circles[:, :2], 3).tolist()}
+    for seed in held_out().seeds[:5]:
+        other = generate(seed)
+        assert places != {tuple(place) for place in np.round(other.circles[:, :2] - other.start_ned_m, 3).tolist()}
+    assert barred_share(world) > 0.0 or barred_share(random_world("cellular", "train", 1)) > 0.0
 
 
 def test_forests_cover_their_range_of_densities() -> None:
