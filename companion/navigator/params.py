@@ -65,7 +65,7 @@ class PolicyParams:
 class TightParams:
     """When another set of parameters flies."""
 
-    profile: str = param("", "SN_TI_PROFILE", "Profile that flies where it is tight; empty: none does")
+    profile: str = param("tight", "SN_TI_PROFILE", "Profile that flies where it is tight; empty: none does")
     radius_m: float = param(3.0, "SN_TI_RADIUS", "Density counts bearings blocked within this", "m", 0.5, 30.0)
     density_enter: float = param(0.5, "SN_TI_ENTER", "Density from which it is tight", "", 0.0, 1.0)
     density_exit: float = param(0.3, "SN_TI_EXIT", "Density up to which it is open again", "", 0.0, 1.0)

@@ -70,7 +70,9 @@ def noticed(memory: Memory, percept: Percept, verdict: Verdict | None, params: P
     """
     rule, now, state = params.tight, memory.tight, memory.state
     by_expert = params.policy.guard or params.policy.name == GeometricExpert.name
-    if not rule.profile or not by_expert or state is None or memory.t_s - now.since_t_s < rule.dwell_s:
+    if not rule.profile or not by_expert or memory.t_s - now.since_t_s < rule.dwell_s:
+        return memory
+    if state is None or state.t_s < memory.t_s:  # a tick without a state that could be believed
         return memory
     density = local_density(percept.bearing_range_m, rule.radius_m)
     stuck = verdict is not None and verdict.kind in STUCK

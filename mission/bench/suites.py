@@ -40,6 +40,7 @@ LOQUERCIO: Final = Rules(
     range_m=6.0,
     rate_hz=1.0 / 0.068,
 )
+ONE_SET: Final[dict[str, Any]] = {"profile": ""}  # parameters chosen for a suite fly all of it
 # What an opening of 0.8 m asks of a sphere of 0.2 m: cells finer than the room to spare, margins that fit in, no
 # corners cut; and where to look in a wall that shows none.
 NARROW: Final[dict[str, dict[str, Any]]] = {
@@ -47,10 +48,12 @@ NARROW: Final[dict[str, dict[str, Any]]] = {
     "expert": {"margin_m": 0.10, "tight_m": 0.03, "wall_m": 3.0},
     "follower": {"off_path_m": 0.05, "off_path_gain_1_m": 5.0, "off_path_share": 0.2},
     "limits": {"corner_cut_m": 0.06},
+    "tight": ONE_SET,
 }
 # As quick as the vehicle is: 6 m/s2 of the 6.9 that its tilt leaves, and what a stop comes too late for is passed.
-POLE_PARAMS: Final[dict[str, dict[str, Any]]] = {"limits": {"swerve_m_s2": 6.5}}
+POLE_PARAMS: Final[dict[str, dict[str, Any]]] = {"limits": {"swerve_m_s2": 6.5}, "tight": ONE_SET}
 FOREST_PARAMS: Final[dict[str, dict[str, Any]]] = {
+    "tight": ONE_SET,
     "arbiter": {"s_enter": 0.995, "s_exit": 0.999, "d_enter_m": 6.0, "d_exit_m": 6.5},  # nothing is seen from afar
     "expert": {"comfort_m": 0.8, "margin_m": 0.35, "tight_m": 0.2},
     "checker": {"margin_full_m": 0.3, "margin_reduced_m": 0.2, "margin_least_m": 0.12},
@@ -70,6 +73,7 @@ FOREST_PARAMS: Final[dict[str, dict[str, Any]]] = {
 }
 # As profile 'crowd': no speed from which the vehicle would not stand before what moves can be where it is.
 YARD_PARAMS: Final[dict[str, dict[str, Any]]] = {
+    "tight": ONE_SET,
     "movers": {"again_m": 0.45, "link_m": 0.5, "ahead_s": 1.5},
     "yielding": {"ahead_s": 3.0, "weight_m": 10.0},
 }

@@ -24,7 +24,7 @@ from mission.training.flights import plan_world
 from sitl.simulation import Simulation
 from sitl.world import World
 
-BOTH = update(PARAMS, {"tight": {"profile": "tight"}})
+BOTH, ONE = PARAMS, update(PARAMS, {"tight": {"profile": ""}})
 OPEN, CLOSE = Eye(world([(6.0, 5.0, 0.3)])), Eye(world(ring(1.2)))
 DWELL_TICKS = 51  # of 40 ms: a little more than 2 s
 CALM = {"wind": WindSpec(mean_m_s=(0.0, 0.0), turbulence="none")}
@@ -118,7 +118,7 @@ def test_a_disarmed_vehicle_begins_in_the_open() -> None:
 def test_the_other_set_is_the_profile_on_top_of_ones_own() -> None:
     mine = update(BOTH, {"limits": {"decel_m_s2": 1.5}})
     assert tight_set(mine) == update(mine, profile_named("tight"))
-    assert tight_set(PARAMS) is PARAMS
+    assert tight_set(ONE) is ONE
     with pytest.raises(ParamError, match="unknown profile 'tigth'; did you mean 'tight'"):
         tight_set(update(PARAMS, {"tight": {"profile": "tigth"}}))
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from bench_rows import row
 
-from companion.navigator.profiles import profile_named, profile_names
 from companion.core import params as core_params
 from companion.core.params import ParamError
 from companion.core.types import Scan, Setpoint
 from companion.navigator import Params
+from companion.navigator.profiles import profile_named, profile_names
 from mission.bench import run
 from mission.bench.course import Course, Rules
 from mission.bench.document import write_document
