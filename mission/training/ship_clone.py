@@ -32,7 +32,8 @@ LIMITS = (
 )
 OPEN = "Trained and tested at 3 m/s cruise, 72 sectors of 5 deg, standing obstacles, winds up to 6 m/s; nothing else."
 PROFILED = (
-    "Trained and tested with the profile '{}' at {:g} m/s cruise, 72 sectors of 5 deg, in still air; nothing else."
+    "Trained and tested with the profile '{}' at {:g} m/s cruise, 72 sectors of 5 deg, standing obstacles, winds up to"
+    " {:g} m/s; nothing else."
 )
 GUARD_OFF = "guard_off"
 
@@ -83,7 +84,10 @@ def arms(policy: str, world: str) -> dict[str, EvalSpec]:
 def _limits(training: Mapping[str, Any]) -> tuple[str, ...]:
     """What it is not good for, by the settings of its training."""
     profile = training.get("profile")
-    return (OPEN if profile is None else PROFILED.format(profile, training["cruise_m_s"]), *LIMITS)
+    return (
+        OPEN if profile is None else PROFILED.format(profile, training["cruise_m_s"], training["wind_m_s"][1]),
+        *LIMITS,
+    )
 
 
 def _learned(run: Path) -> Path:

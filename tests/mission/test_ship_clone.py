@@ -54,7 +54,9 @@ def test_a_card_names_the_profile_that_was_trained_with(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     card, actor = read_policy(run / "round-0")
-    save_policy(run / "round-0", actor, replace(card, training={"profile": "tight", "cruise_m_s": 2.0}))
+    save_policy(
+        run / "round-0", actor, replace(card, training={"profile": "tight", "cruise_m_s": 2.0, "wind_m_s": [0.0, 1.0]})
+    )
     monkeypatch.setattr(module, "fly_one", flight)
     ship_clone(CloneShipment(run, "tight", ("cellular",), 1, 1, 7, tmp_path / "out"), lambda *_: None)
     card, _ = read_policy(tmp_path / "out" / "tight")
