@@ -89,11 +89,20 @@ def noticed(memory: Memory, percept: Percept, verdict: Verdict | None, params: P
 
 @lru_cache(maxsize=8)
 def tight_set(params: Params, calm: bool = True) -> Params:
-    """The parameters with the profile's on top; themselves where none is named. Raises ParamError."""
+    """The parameters with the profile's on top, but for those that differ from the defaults: what was chosen, holds.
+
+    Themselves where no profile is named. Raises ParamError.
+    """
     if not params.tight.profile:
         return params
-    tight = update(params, profile_named(params.tight.profile))
-    if calm:
-        return tight
-    own = {group: {name: getattr(getattr(params, group), name) for name in names} for group, names in MARGINS.items()}
-    return update(tight, own)
+    chosen = {
+        group: {name: value for name, value in fields.items() if _open_to(params, group, name, calm)}
+        for group, fields in profile_named(params.tight.profile).items()
+    }
+    return update(params, chosen)
+
+
+def _open_to(params: Params, group: str, name: str, calm: bool) -> bool:
+    """May the profile set this one? An unknown one too: ``update`` will say so."""
+    as_given, as_shipped = (getattr(getattr(whole, group, None), name, None) for whole in (params, Params()))
+    return as_given == as_shipped and (calm or name not in MARGINS.get(group, ()))

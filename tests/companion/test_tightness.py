@@ -115,9 +115,12 @@ def test_a_disarmed_vehicle_begins_in_the_open() -> None:
     assert not is_tight(pilot) and pilot.memory.grid.cell_m == PARAMS.map.cell_m
 
 
-def test_the_other_set_is_the_profile_on_top_of_ones_own() -> None:
-    mine = update(BOTH, {"limits": {"decel_m_s2": 1.5}})
-    assert tight_set(mine) == update(mine, profile_named("tight"))
+def test_the_other_set_is_the_profile_on_top_of_ones_own_and_what_was_chosen_holds_in_both() -> None:
+    assert tight_set(BOTH) == update(BOTH, profile_named("tight"))
+    mine = update(BOTH, {"limits": {"decel_m_s2": 1.5}, "checker": {"margin_full_m": 0.5}})
+    theirs = profile_named("tight")
+    del theirs["checker"]["margin_full_m"]
+    assert tight_set(mine) == update(mine, theirs)
     assert tight_set(ONE) is ONE
     with pytest.raises(ParamError, match="unknown profile 'tigth'; did you mean 'tight'"):
         tight_set(update(PARAMS, {"tight": {"profile": "tigth"}}))
