@@ -119,7 +119,8 @@ def _machines(told: list[str]) -> str:
         machine, _, rest = text.partition(", load ")
         load, _, cores = rest.partition(" ")
         loads.setdefault((machine, cores), []).append(float(load))
-    return "; ".join(f"{who}, load {min(seen):g} to {max(seen):g} {cores}" for (who, cores), seen in loads.items())
+    spans = {key: " to ".join(f"{load:g}" for load in sorted({min(seen), max(seen)})) for key, seen in loads.items()}
+    return "; ".join(f"{who}, load {spans[who, cores]} {cores}" for who, cores in spans)
 
 
 def _table(entries: list[Flown], scored: bool) -> list[str]:
