@@ -22,7 +22,7 @@ from companion.core.keyring import KeyFileError
 from companion.core.transport import TransportError
 from companion.link.lidar import LidarError
 from companion.navigator.decide import policy_named
-from companion.navigator.tightness import tight_set
+from companion.navigator.tightness import sets
 
 DISTRIBUTIONS = ("swiftnav", "numpy", "scipy", "pymavlink")
 
@@ -50,7 +50,7 @@ def fly(
     with ExitStack() as stack:
         try:
             check(config)
-            for tuned in (config.params, tight_set(config.params)):
+            for tuned in sets(config.params):
                 policy_named(tuned.policy.name, tuned)  # reads profile and weights now, not in flight
             opened = open_all(config, clock, stack)
             logs = stack.enter_context(closing(FlightLogs(config.log_dir)))

@@ -32,12 +32,14 @@ SOON_S = 0.05  # no contact counts as sooner
 class YieldParams:
     """Giving way to what moves."""
 
-    ahead_s: float = param(0.0, "YLD_AHEAD", "contacts are looked for so far ahead (0: no way is given)", "s", 0.0, 5.0)
-    lag_s: float = param(0.2, "YLD_LAG", "scan age, link, tick and tilt lag before a velocity bites", "s", 0.0, 1.0)
-    acc_m_s2: float = param(4.0, "YLD_ACC", "how fast the velocity changes then", "m/s2", 0.5, 7.0)
-    room_m: float = param(0.1, "YLD_ROOM", "kept between hull and what moves", "m", 0.0, 1.0)
-    turn: float = param(1.0, "YLD_TURN", "share of its speed with which it may turn back at once", "", 0.0, 1.0)
-    weight_m: float = param(6.0, "YLD_WEIGHT", "cost of a contact soon against a change of velocity", "m", 0.0, 50.0)
+    ahead_s: float = param(
+        0.0, "SN_YL_AHEAD", "contacts are looked for so far ahead (0: no way is given)", "s", 0.0, 5.0
+    )
+    lag_s: float = param(0.2, "SN_YL_LAG", "scan age, link, tick and tilt lag before a velocity bites", "s", 0.0, 1.0)
+    acc_m_s2: float = param(4.0, "SN_YL_ACC", "how fast the velocity changes then", "m/s^2", 0.5, 7.0)
+    room_m: float = param(0.1, "SN_YL_ROOM", "kept between hull and what moves", "m", 0.0, 1.0)
+    turn: float = param(1.0, "SN_YL_TURN", "share of its speed with which it may turn back at once", "", 0.0, 1.0)
+    weight_m: float = param(6.0, "SN_YL_WEIGHT", "cost of a contact soon against a change of velocity", "m", 0.0, 50.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,6 +87,11 @@ def noticed(memory: Memory, percept: Percept, verdict: Verdict | None, params: P
     return replace(memory, grid=grid, tight=replace(now, since_t_s=memory.t_s, aside=aside))
 
 
+def sets(params: Params) -> tuple[Params, ...]:
+    """Every set that may come to fly: read before a flight, they are not read in it. Raises ParamError."""
+    return params, tight_set(params), tight_set(params, calm=False)
+
+
 @lru_cache(maxsize=8)
 def tight_set(params: Params, calm: bool = True) -> Params:
     """The parameters with the profile's on top, but for those that differ from the defaults: what was chosen, holds.
@@ -98,6 +103,7 @@ def tight_set(params: Params, calm: bool = True) -> Params:
     chosen = {
         group: {name: value for name, value in fields.items() if _open_to(params, group, name, calm)}
         for group, fields in profile_named(params.tight.profile).items()
+        if group != "tight"  # when to change back is said by the set of the open
     }
     return update(params, chosen)
 

@@ -17,7 +17,7 @@ from companion.core.params import ParamError, update
 from companion.core.types import AutopilotStatus, VehicleState
 from companion.navigator.memory import Tightness
 from companion.navigator.profiles import profile_named
-from companion.navigator.tightness import GRAVITY_M_S2, felt, tight_set
+from companion.navigator.tightness import GRAVITY_M_S2, felt, sets, tight_set
 from mission.mission_file import WindSpec, load_mission
 from mission.simulate import fly_in_process
 from mission.training.flights import plan_world
@@ -116,9 +116,9 @@ def test_a_disarmed_vehicle_begins_in_the_open() -> None:
 
 
 def test_the_other_set_is_the_profile_on_top_of_ones_own_and_what_was_chosen_holds_in_both() -> None:
-    assert tight_set(BOTH) == update(BOTH, profile_named("tight"))
+    theirs = {group: fields for group, fields in profile_named("tight").items() if group != "tight"}
+    assert tight_set(BOTH) == update(BOTH, theirs)
     mine = update(BOTH, {"limits": {"decel_m_s2": 1.5}, "checker": {"margin_full_m": 0.5}})
-    theirs = profile_named("tight")
     del theirs["checker"]["margin_full_m"]
     assert tight_set(mine) == update(mine, theirs)
     assert tight_set(ONE) is ONE
@@ -157,6 +157,14 @@ def test_still_air_pushes_nobody() -> None:
         state = VehicleState(1.0 + 0.04 * tick, np.zeros(3), vel, quaternion(0.0, tilt_rad, 0.0), np.zeros(3))
         now, before = felt(now, before, state, BOTH.tight), state
     assert now.push_ne_m_s2 == pytest.approx((0.0, 0.0), abs=1e-9) and now.calm
+
+
+def test_by_name_the_profile_flies_alone() -> None:
+    alone = update(PARAMS, profile_named("tight"))
+    assert sets(alone) == (alone,) * 3
+    pilot = Pilot(CLOSE, params=alone)
+    pilot.ticks(DWELL_TICKS)
+    assert not is_tight(pilot)
 
 
 def test_in_wind_the_margins_stay_those_of_the_open() -> None:
