@@ -35,7 +35,7 @@ from sitl.world import World
 
 TRUNKS = ((6.0, 1.2), (6.5, -1.4), (9.0, 0.1), (12.5, -1.5), (12.0, 1.6))
 # Short, so that without penalty and prioritized replay something is learned in a minute: on Trajectory 1, 40 flights
-# end with 3 % of successes on both sides, which says nothing.
+# end with 3 to 5 % of successes on both sides, which says nothing.
 LANE = World(
     name="lane",
     start_ned_m=np.zeros(2),
