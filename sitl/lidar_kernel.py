@@ -5,32 +5,20 @@ cost goes with what is visible and not with rays x obstacles.
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, TypeVar
 
 import numpy as np
 
 from companion.core.types import F64
-
-try:
-    from numba import njit
-except ImportError as missing:
-    raise ImportError("the LiDAR needs numba: pip install 'swiftnav[sitl]'") from missing
+from sitl.compiled import compiled
 
 EDGE_ON = 1e-6  # cosine of the tilt below which the sweep is vertical and bearings no longer order the rays
 INDEX_SLACK = 1e-6  # rays; a ray that grazes an obstacle's edge is tested rather than missed
 IRWIN_HALL_SCALE = math.sqrt(3.0) / 65536.0  # the sum of four 16-bit uniforms has sigma 65536 / sqrt(3)
 
-Function = TypeVar("Function", bound=Callable[..., Any])
 Frame = tuple[float, float, float, float, float, float]  # forward and right axis of the body, each north, east, down
 
 
-def _compiled(function: Function) -> Function:
-    kernel: Function = njit(cache=True)(function)
-    return kernel
-
-
-@_compiled
+@compiled
 def cast_rays(
     pos_ned_m: F64, q_ned_frd: F64, circles: F64, boxes: F64, cos_sin: F64, range_max_m: float, range_m: F64
 ) -> None:
@@ -55,7 +43,7 @@ def cast_rays(
         _cast_at_box(pos_ned_m, up_m, frame, boxes[k], cos_sin, range_max_m, range_m)
 
 
-@_compiled
+@compiled
 def _cast_at_circle(
     pos_ned_m: F64, up_m: float, frame: Frame, circle: F64, cos_sin: F64, range_max_m: float, range_m: F64
 ) -> None:
@@ -91,7 +79,7 @@ def _cast_at_circle(
         _keep_nearest(i, near, far, fd * c + rd * s, up_m, circle[3], range_max_m, range_m)
 
 
-@_compiled
+@compiled
 def _cast_at_box(
     pos_ned_m: F64, up_m: float, frame: Frame, box: F64, cos_sin: F64, range_max_m: float, range_m: F64
 ) -> None:
@@ -116,7 +104,7 @@ def _cast_at_box(
             _keep_nearest(i, near, far, fd * c + rd * s, up_m, box[6], range_max_m, range_m)
 
 
-@_compiled
+@compiled
 def _slab(offset: float, direction: float, half: float) -> tuple[float, float]:
     """Interval of ray parameter inside |coordinate| <= half."""
     if direction == 0.0:
@@ -125,7 +113,7 @@ def _slab(offset: float, direction: float, half: float) -> tuple[float, float]:
     return (a, b) if a < b else (b, a)
 
 
-@_compiled
+@compiled
 def _keep_nearest(
     i: int, near: float, far: float, down: float, up_m: float, height_m: float, range_max_m: float, range_m: F64
 ) -> None:
@@ -141,7 +129,7 @@ def _keep_nearest(
         range_m[i] = near
 
 
-@_compiled
+@compiled
 def _box_interval(
     frame: Frame, north: float, east: float, cy: float, sy: float, hl: float, hw: float, rays: int
 ) -> tuple[int, int]:
@@ -158,7 +146,7 @@ def _box_interval(
     return _ray_interval(frame, lo_n, lo_e, hi_n, hi_e, rays)
 
 
-@_compiled
+@compiled
 def _ray_interval(frame: Frame, lo_n: float, lo_e: float, hi_n: float, hi_e: float, rays: int) -> tuple[int, int]:
     """First ray and number of rays whose horizontal bearing lies clockwise between two directions < pi apart."""
     fn, fe, _, rn, re, _ = frame
@@ -178,7 +166,7 @@ def _ray_interval(frame: Frame, lo_n: float, lo_e: float, hi_n: float, hi_e: flo
     return first % rays, count
 
 
-@_compiled
+@compiled
 def measure(
     true_m: F64, key: np.uint64, sigma_m: float, dropout: float, range_min_m: float, range_max_m: float
 ) -> None:
@@ -192,7 +180,7 @@ def measure(
             true_m[i] = measured if measured <= range_max_m else math.inf
 
 
-@_compiled
+@compiled
 def _near_gaussian(bits: np.uint64) -> float:
     """Zero mean, unit sigma: Irwin-Hall of four 16-bit uniforms, within 3.5 sigma."""
     low = np.uint64(0xFFFF)
@@ -200,7 +188,7 @@ def _near_gaussian(bits: np.uint64) -> float:
     return (np.float64(total) - 131070.0) * IRWIN_HALL_SCALE
 
 
-@_compiled
+@compiled
 def _mix(value: np.uint64) -> np.uint64:
     """splitmix64 finaliser: 64 independent-looking bits from a counter."""
     value = value * np.uint64(0x9E3779B97F4A7C15)
@@ -209,7 +197,7 @@ def _mix(value: np.uint64) -> np.uint64:
     return value ^ (value >> np.uint64(31))
 
 
-@_compiled
+@compiled
 def sector_minima(ray_m: F64, first_ray: int, sector_m: F64) -> None:
     """Sector ``i`` takes the nearest of its rays that were not dropped; nan only if all were."""
     rays = ray_m.shape[0]

@@ -138,6 +138,6 @@ def test_a_sensor_that_cannot_be_is_refused(bad: dict[str, float], message: str)
 
 def test_a_missing_numba_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "numba", None)
-    monkeypatch.delitem(sys.modules, "sitl.lidar_kernel")
+    monkeypatch.delitem(sys.modules, "sitl.compiled")
     with pytest.raises(ImportError, match=r"swiftnav\[sitl\]"):
-        importlib.import_module("sitl.lidar_kernel")
+        importlib.import_module("sitl.compiled")
