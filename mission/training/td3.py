@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import Tensor
 from torch.nn import functional
 
 from companion.policy.actor import Actor
+from mission.training.adam import Adam, side_by_side
 from mission.training.networks import TwinCritic, actor_net, as_numpy, single_thread
 from mission.training.replay import Batch
 
@@ -83,8 +84,9 @@ class TD3:
         self._critic = TwinCritic(obs_dim + action_dim, config.hidden, seed + 1).to(self._device)
         self._actor_target, self._critic_target = deepcopy(self._actor), deepcopy(self._critic)
         self._average = deepcopy(self._actor) if config.average else self._actor
-        self._actor_optimiser = _adam(self._actor, config.actor_rate)
-        self._critic_optimiser = _adam(self._critic, config.critic_rate)
+        self._actor_optimiser, self._critic_optimiser = Adam(self._actor), Adam(self._critic)
+        self._actor_slow, self._critic_slow = side_by_side(self._actor_target), side_by_side(self._critic_target)
+        self._average_slow = side_by_side(self._average) if config.average else self._actor_optimiser.weights
         self._generator = torch.Generator(self._device).manual_seed(seed)
         self._updates = 0
 
@@ -112,7 +114,7 @@ class TD3:
         values = self._critic(b.obs, b.action)
         errors = functional.smooth_l1_loss if self.config.huber else functional.mse_loss
         loss = (errors(values, target.expand_as(values), reduction="none").sum(dim=0) * b.weights).mean()
-        _descend(self._critic, self._critic_optimiser, loss, self.config.critic_rate * self._rate_left())
+        self._critic_optimiser.step(loss, self.config.critic_rate * self._rate_left())
         self._updates += 1
         figures = {
             "td_errors": (values[0] - target).detach().abs().cpu().numpy().astype(np.float64),
@@ -122,8 +124,8 @@ class TD3:
         if self._updates % self.config.actor_every == 0:
             if self._updates > self.config.actor_after:
                 figures |= self._update_actor(b.obs)
-            _follow(self._critic_target, self._critic, self.config.tau)
-            _follow(self._actor_target, self._actor, self.config.tau)
+            self._critic_slow.lerp_(self._critic_optimiser.weights, self.config.tau)  # eq. td3_soft
+            self._actor_slow.lerp_(self._actor_optimiser.weights, self.config.tau)
         return figures
 
     def state_dict(self) -> State:
@@ -134,8 +136,8 @@ class TD3:
             "critic": _copied(self._critic.state_dict()),
             "actor_target": _copied(self._actor_target.state_dict()),
             "critic_target": _copied(self._critic_target.state_dict()),
-            "actor_optimiser": deepcopy(self._actor_optimiser.state_dict()),
-            "critic_optimiser": deepcopy(self._critic_optimiser.state_dict()),
+            "actor_optimiser": self._actor_optimiser.state_dict(),
+            "critic_optimiser": self._critic_optimiser.state_dict(),
             "generator": self._generator.get_state(),
             "updates": self._updates,
         }
@@ -166,9 +168,9 @@ class TD3:
         action = torch.tanh(output)
         penalty = self.config.saturation_penalty * output.square().mean()
         loss = penalty - self._critic.first(obs, action).mean()
-        _descend(self._actor, self._actor_optimiser, loss, self.config.actor_rate * self._rate_left())
+        self._actor_optimiser.step(loss, self.config.actor_rate * self._rate_left())
         if self.config.average:
-            _follow(self._average, self._actor, self.config.average)
+            self._average_slow.lerp_(self._actor_optimiser.weights, self.config.average)
         saturated = (action.detach().abs() > SATURATED).float().mean()
         return {"actor_loss": float(loss.detach()), "saturated": float(saturated)}
 
@@ -195,26 +197,6 @@ class _Tensors:
     discount: Tensor  # (n,)
     terminated: Tensor  # (n,) 1 or 0
     weights: Tensor  # (n,)
-
-
-def _adam(net: nn.Module, rate: float) -> torch.optim.Adam:
-    return torch.optim.Adam(net.parameters(), lr=rate, fused=True)
-
-
-def _descend(net: nn.Module, optimiser: torch.optim.Adam, loss: Tensor, rate: float) -> None:
-    """One step; gradients of this net alone, whatever else the loss went through."""
-    parameters = list(net.parameters())
-    for parameter, slope in zip(parameters, torch.autograd.grad(loss, parameters), strict=True):
-        parameter.grad = slope
-    optimiser.param_groups[0]["lr"] = rate
-    optimiser.step()
-
-
-def _follow(target: nn.Module, net: nn.Module, tau: float) -> None:
-    """eq. td3_soft."""
-    with torch.no_grad():
-        for slow, fast in zip(target.parameters(), net.parameters(), strict=True):
-            slow.lerp_(fast, tau)
 
 
 def _copied(state: State) -> State:

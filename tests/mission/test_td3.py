@@ -15,6 +15,7 @@ from companion.policy.learned import PolicySpec
 from companion.policy.observations import SIZES, mirror_observation
 from companion.policy.store import Card, save_policy
 from mission.training import bc, export
+from mission.training.adam import Adam
 from mission.training.mirror import half_mirrored
 from mission.training.networks import TwinCritic, actor_net, as_numpy
 from mission.training.replay import Batch, Replay, ReplayConfig
@@ -146,10 +147,22 @@ def test_rates_fall_evenly_to_a_tenth_and_stay_there() -> None:
     for k in range(7):
         learner.update(batch(seed=k))
         state = learner.state_dict()
-        rates.append([state[f"{name}_optimiser"]["param_groups"][0]["lr"] for name in ("critic", "actor")])
+        rates.append([state[f"{name}_optimiser"]["rate"] for name in ("critic", "actor")])
     shares = np.array([1.0, 0.775, 0.55, 0.325, 0.1, 0.1, 0.1, 0.1])
     assert np.array(rates)[:, 0] == pytest.approx(2e-3 * shares[:-1])
     assert np.array(rates)[:, 1] == pytest.approx(1e-3 * shares[1:])
+
+
+def test_a_step_is_that_of_torch() -> None:
+    ours, theirs = (actor_net(OBS, ACTION, (16,), seed=1) for _ in range(2))
+    adam, known = Adam(ours), torch.optim.Adam(theirs.parameters())
+    for k in range(20):
+        obs = torch.from_numpy(batch(seed=k).obs)
+        adam.step(ours(obs).square().mean(), rate=1e-3)
+        known.zero_grad()
+        theirs(obs).square().mean().backward()
+        known.step()
+    assert all(torch.allclose(a, b, atol=1e-6) for a, b in zip(ours.parameters(), theirs.parameters(), strict=True))
 
 
 def test_an_untrained_actor_says_zero() -> None:
