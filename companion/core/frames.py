@@ -25,6 +25,12 @@ def rotation_ned_frd(q_ned_frd: F64) -> F64:
     )
 
 
+def down_frd_ned(q_ned_frd: F64) -> tuple[float, float, float]:
+    """Where the body's down axis points, ned: the last column of ``rotation_ned_frd``."""
+    w, x, y, z = q_ned_frd.tolist()
+    return 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
+
+
 def euler_rad(q_ned_frd: F64) -> tuple[float, float, float]:
     """Roll, pitch, yaw (Z-Y-X, radians)."""
     w, x, y, z = q_ned_frd.tolist()

@@ -99,8 +99,10 @@ def update(grid: GridMap, scan: PolarScan, params: MapParams) -> GridMap:
     """The map after one more scan."""
     grid = _rolled(grid, scan.pos_ne_m)
     certain = _certain(grid, scan, params)
-    free_t = np.maximum(grid.free_t, certain * np.float32(scan.t_s))
-    hit_t = grid.hit_t * (1.0 - certain)
+    free_t = certain * np.float32(scan.t_s)
+    np.maximum(free_t, grid.free_t, out=free_t)
+    hit_t = np.subtract(1.0, certain, out=certain)
+    hit_t *= grid.hit_t
     hit_ne_m = grid.hit_ne_m.copy()
     moved_ne_m = _paint(grid, free_t, hit_t, hit_ne_m, scan, params)
     return GridMap(grid.cell_m, grid.corner, free_t, hit_t, hit_ne_m, moved_ne_m)

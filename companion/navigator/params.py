@@ -96,3 +96,7 @@ class Params:
     limits: LimitsParams = field(default_factory=LimitsParams)
     landing: LandingParams = field(default_factory=LandingParams)
     yielding: YieldParams = field(default_factory=YieldParams)
+
+    def __hash__(self) -> int:
+        """Of three groups, and so quick: every tick looks up what belongs to its set."""
+        return hash((self.vehicle, self.map, self.policy))

@@ -15,7 +15,7 @@ from functools import lru_cache
 from typing import Final
 
 from companion.checker.checker import Verdict, VerdictKind
-from companion.core.frames import rotation_ned_frd
+from companion.core.frames import down_frd_ned
 from companion.core.gridmap import empty, occupied_points, with_hits
 from companion.core.params import update
 from companion.core.types import VehicleState
@@ -48,12 +48,13 @@ def felt(now: Tightness, before: VehicleState | None, state: VehicleState, rule:
     if not rule.profile or before is None or not state.t_s > before.t_s:
         return now
     dt_s = state.t_s - before.t_s
-    down = rotation_ned_frd(state.q_ned_frd)[:, 2].tolist()
+    down = down_frd_ned(state.q_ned_frd)
     share = min(dt_s / PUSH_TAU_S, 1.0)
-    unaided = (state.vel_ned_m_s[:2] - before.vel_ned_m_s[:2]) / dt_s + rule.drag_1_s * state.vel_ned_m_s[:2]
+    was, vel = before.vel_ned_m_s.tolist(), state.vel_ned_m_s.tolist()
+    unaided = [(vel[axis] - was[axis]) / dt_s + rule.drag_1_s * vel[axis] for axis in (0, 1)]
     north, east = (
         old + share * (acc + GRAVITY_M_S2 * axis / max(down[2], UPRIGHT) - old)
-        for old, acc, axis in zip(now.push_ne_m_s2, unaided.tolist(), down[:2], strict=True)
+        for old, acc, axis in zip(now.push_ne_m_s2, unaided, down[:2], strict=True)
     )
     calm = math.hypot(north, east) < rule.calm_m_s2 * (1.0 if now.calm else STILL)
     return replace(now, push_ne_m_s2=(north, east), calm=calm)
