@@ -76,6 +76,7 @@ def question(engaged: Engagement, state: VehicleState, percept: Percept, task: T
         observation(state, obstacles_ne_m, engaged.start_ne_m, task.goal_ned_m),
         engaged.start_ne_m,
         task.cruise_m_s,
+        engaged.course_rad,
     )
 
 
@@ -110,7 +111,7 @@ def settle(
     if verdict.path_ned_m is None:
         escape = _escape(state.pos_ned_m[:2], query.goal_ne_m, percept, params)
         verdict = check(replace(asked, proposal_ned_m=None, others_ned_m=(), escape_ned_m=escape), params.checker)
-    path = None
+    path, course_rad = None, engaged.course_rad
     if verdict.path_ned_m is not None and verdict.margin_m is not None:
         lasts_s, used_up_m, run_out_m = params.policy.wear(guarded)
         if not guarded and proposal is not None and proposal.lasts_s is not None:
@@ -121,9 +122,12 @@ def settle(
             or math.dist(vertices[-1].tolist(), query.goal_ne_m[:2].tolist()) < used_up_m
         ):
             run_out_m = 0.0
+        ahead = vertices[-1] - query.prefix_ne_m[-1]
+        course_rad = math.atan2(ahead[1], ahead[0])
         path = Path(vertices, 0.0, verdict.margin_m, state.t_s, lasts_s, used_up_m, run_out_m)
     memory = replace(memory, policy=answer.memory, guard=way, decisions=memory.decisions + 1)
-    return memory, replace(engaged, path=path, tried_t_s=state.t_s), Decision(asked.proposal_ned_m, verdict, guarded)
+    engaged = replace(engaged, path=path, tried_t_s=state.t_s, course_rad=course_rad)
+    return memory, engaged, Decision(asked.proposal_ned_m, verdict, guarded)
 
 
 def policy_named(name: str, params: Params) -> Policy:

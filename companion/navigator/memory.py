@@ -43,6 +43,7 @@ class Engagement:
     landing: LandingState | None
     stop: HoldMemory | None  # while braking or holding
     swerve: Swerve | None = None  # the last one
+    course_rad: float | None = None  # of the last accepted path, from its anchor to its end
 
 
 @dataclass(frozen=True, slots=True)

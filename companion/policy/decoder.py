@@ -73,11 +73,11 @@ def proposal(name: str, action: F64, query: Query, params: DecoderParams) -> Pro
     nexts = [(side_rad + steps * step_rad, length_m) for steps in ASIDES]
     nexts += [(side_rad + steps * step_rad, SHORT * length_m) for steps in SHORT_ASIDES]
     return Proposal(
-        first, _Choices(nexts, lambda aside, way_m: joined(query, arc(aside, turn_rad, way_m, query, params)))
+        first, Choices(nexts, lambda aside, way_m: joined(query, arc(aside, turn_rad, way_m, query, params)))
     )
 
 
-class _Choices(Sequence[F64]):
+class Choices(Sequence[F64]):
     """Next choices, each decoded when it is asked for: mostly the first is kept, and all of them cost a tick's time."""
 
     def __init__(self, ways: list[tuple[float, float]], decoded: Callable[[float, float], F64]) -> None:

@@ -18,6 +18,7 @@ from companion.core.params import param
 from companion.core.types import F64
 from companion.policy.blocks import block_of, cells_back, cells_of_blocks, in_blocks, reach_over
 from companion.policy.centring import centred, distances, opened
+from companion.policy.chords import chords
 from companion.policy.grid_path import BLOCKED, LIMIT, Reach, clearances, nearest_cells, reach_from, walk_back
 from companion.policy.interface import WAYPOINTS, Proposal, Query
 
@@ -51,7 +52,6 @@ class ExpertParams:
 BORDER_CELLS = 2  # paths to a goal outside the map end in this rim
 CHORD_RELAX = (1.0, 2.0, 4.0)
 FINE_M = 0.1  # cells up to this edge are searched in blocks of two
-CHORD_POINTS = 20  # of the path that one chord replaces, at most
 UNREACHED = 4.0  # cost a cell from where a way ends to a goal on the map: that is approached as near as possible
 
 
@@ -304,35 +304,10 @@ def _joined(prefix: F64, path: F64) -> F64:
 def _cut(path: F64, params: ExpertParams) -> F64:
     """At most five waypoints (k, 2) whose chords stay near the path."""
     for relax in CHORD_RELAX:
-        waypoints = _chords(path, params.chord_m * relax, params.length_m)
+        waypoints = chords(path, params.chord_m * relax, params.length_m)
         if length(np.concatenate([path[:1], waypoints])) >= params.useful_m or len(waypoints) < WAYPOINTS:
             break
     return waypoints
-
-
-def _chords(path: F64, tolerance_m: float, length_m: float) -> F64:
-    """Greedy: each chord as long as the path between its ends stays within the tolerance."""
-    picked: list[int] = []
-    at, used = 0, 0.0
-    while at < len(path) - 1 and len(picked) < WAYPOINTS and used < length_m:
-        end = at + _chord(path[at : at + CHORD_POINTS + 1], tolerance_m)
-        used += math.dist(path[at].tolist(), path[end].tolist())
-        picked.append(end)
-        at = end
-    return path[picked]
-
-
-def _chord(path: F64, tolerance_m: float) -> int:
-    """Last place of a stretch up to which every chord from its beginning stays within the tolerance; at least 1."""
-    if len(path) <= 2:
-        return 1
-    dn, de = path[1:, 0] - path[0, 0], path[1:, 1] - path[0, 1]
-    off_m2 = np.abs(dn[None, :] * de[:, None] - de[None, :] * dn[:, None])  # chord to each place, and each place
-    chord_m = np.array([math.hypot(*end) for end in zip(dn.tolist(), de.tolist(), strict=True)])
-    most_m2 = np.tril(off_m2).max(axis=1)  # of the places before the chord's end
-    within = (chord_m >= 1e-9) & (most_m2 / np.maximum(chord_m, 1e-9) <= tolerance_m)
-    within[0] = True
-    return len(within) if within.all() else int(within.argmin())
 
 
 def _cell(grid: GridMap, point_ne_m: F64) -> int:

@@ -4,11 +4,14 @@ Where a path may lead round an obstacle on either side, a number would average t
 them apart, and the second choice is there for when the checker does not keep the first.
 """
 
+from functools import cache
+
 import numpy as np
 
 from companion.core import geometry
 from companion.core.types import F64
-from companion.policy.decoder import SHORT, DecoderParams, arc, beyond_anchor, joined
+from companion.policy.band import between, fits
+from companion.policy.decoder import SHORT, Choices, DecoderParams, arc, beyond_anchor, joined
 from companion.policy.goal_frame import goal_frame
 from companion.policy.interface import Proposal, Query
 
@@ -29,8 +32,12 @@ def headings_rad(params: DecoderParams) -> F64:
     return np.linspace(-params.side_rad, params.side_rad, HEADINGS)
 
 
-def ranked(logits: F64, query: Query, params: DecoderParams) -> tuple[Proposal, float]:
-    """Straight paths along the best heading, refined; close by it, shorter, along the next ones; and that heading."""
+def ranked(logits: F64, query: Query, params: DecoderParams, hits_ne_m: F64 | None = None) -> tuple[Proposal, float]:
+    """Straight paths along the best heading, refined; close by it, shorter, along the next ones; and that heading.
+
+    ``hits_ne_m`` (h, 2): the paths are pushed to the middle between them, and where one along the best heading fits
+    there are no next ones: the checker would rather have any that has its full margin. None: straight, and all of them.
+    """
     headings = headings_rad(params)
     order = np.argsort(-logits, kind="stable")[: NEXT_HEADINGS + 1]
     order = order[logits[order] >= logits[order[0]] - AGAINST]
@@ -38,10 +45,15 @@ def ranked(logits: F64, query: Query, params: DecoderParams) -> tuple[Proposal, 
     close_by = [best + share * float(headings[1] - headings[0]) for share in ASIDE]
     whole_m = params.headings_m
     choices = [(heading, share * whole_m) for share in LENGTHS for heading in close_by]
-    choices += [(heading, whole_m) for heading in headings[order[1:]].tolist()]
-    paths = [arc(heading, 0.0, length_m, query, params) for heading, length_m in choices]
-    first, *others = (joined(query, path) for path in paths)
-    return Proposal(first, tuple(others), LASTS_S), best
+
+    @cache
+    def path(heading_rad: float, length_m: float) -> F64:
+        way = arc(heading_rad, 0.0, length_m, query, params)
+        return joined(query, way if hits_ne_m is None else between(way, hits_ne_m, query))
+
+    if hits_ne_m is None or not any(fits(path(*choice), hits_ne_m, query) for choice in choices):
+        choices += [(heading, whole_m) for heading in headings[order[1:]].tolist()]
+    return Proposal(path(*choices[0]), Choices(choices[1:], path), LASTS_S), best
 
 
 def steadied(logits: F64, last_rad: float | None, params: DecoderParams) -> F64:

@@ -23,6 +23,7 @@ class Query:
     observation: F64  # (72,)
     start_ne_m: F64  # (2,) where OFFBOARD began: the line to the goal starts there
     cruise_m_s: float = 3.0  # cap of the horizontal speed
+    course_rad: float | None = None  # over ground, from anchor to end of the path that is flown; None: none yet
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,10 +13,14 @@ RANGES = 36  # one each 10 deg, the first towards the goal, clockwise
 CORRIDOR_MARGIN_M = 0.2  # beyond the radius, to either side of a corridor
 
 
+def hits_ne(query: Query, params: MapParams) -> F64:
+    """(k, 2) remembered hits and what movers will sweep, local NED."""
+    return np.concatenate([occupied_points(query.grid, query.state.t_s, params), query.hazard_ne_m])
+
+
 def obstacles(query: Query, frame: GoalFrame, params: MapParams) -> F64:
     """(k, 2) remembered hits and what movers will sweep, in the goal frame, as far as the map senses."""
-    hits = occupied_points(query.grid, query.state.t_s, params)
-    points = frame.from_ne(np.concatenate([hits, query.hazard_ne_m]))
+    points = frame.from_ne(hits_ne(query, params))
     near: F64 = points[np.einsum("ij,ij->i", points, points) < params.sense_m**2]
     return near
 

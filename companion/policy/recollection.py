@@ -49,6 +49,13 @@ def decided(memory: F64, course_rad: float, turn: float) -> F64:
     return memory
 
 
+def flown(memory: F64, course_rad: float) -> F64:
+    """The memory with the course that is flown in place of what was chosen: the checker may have taken another."""
+    memory = memory.copy()
+    memory[COURSE] = course_rad
+    return memory
+
+
 def last_course_rad(memory: F64) -> float | None:
     """Course over ground that was decided last; None before the first decision."""
     return float(memory[COURSE]) if memory[DECIDED] else None

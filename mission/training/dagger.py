@@ -25,7 +25,7 @@ from companion.navigator import Params
 from companion.policy import headings
 from companion.policy.actor import Actor
 from companion.policy.decoder import DecoderParams
-from companion.policy.learned import PolicySpec
+from companion.policy.learned import PolicySpec, ranked, recalled
 from companion.policy.observations import SIZES, last_heading_rad, observe, remember
 from companion.policy.store import Card, read_policy, save_policy
 from mission.errors import InputError
@@ -161,9 +161,10 @@ def _taught(episode: Episode, steering: _Steering, teacher: Teacher, params: Par
         if taught is None:
             episode.decide(None, memory)
             continue
+        memory = recalled(query, memory, spec)
         seen = observe(spec.observation, query, memory, params.map)
         logits = steering.logits(seen, taught.heading_rad, last_heading_rad(query, memory))
-        proposal, heading_rad = headings.ranked(logits, query, spec.decoder_params)
+        proposal, heading_rad = ranked(logits, query, spec, params.map)
         seen_all.append(seen)
         labels_all.append(taught.labels)
         memory = remember(query, memory, heading_rad, 0.0)

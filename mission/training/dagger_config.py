@@ -8,7 +8,7 @@ from companion.core.params import nearest
 from companion.navigator.profiles import profile_named, profile_names
 from companion.policy import observations
 from companion.policy.decoder import DecoderParams
-from companion.policy.learned import PolicySpec
+from companion.policy.learned import RANKINGS, PolicySpec
 from mission.errors import InputError
 from mission.strict_yaml import read_yaml, write_yaml
 from mission.training.configure import configured, plain
@@ -29,6 +29,7 @@ class DaggerConfig:
     cruise_m_s: float = 3.0
     spawn_jitter_m: float = 2.0
     headings_m: float = 4.0  # length of a path
+    head: str = "headings"  # or ``centred``: paths pushed to the middle between hits
     teacher: str = "geometric"  # the expert; or ``map``: who knows the true map, see ``map_teacher``
     observation: str = "map"  # see ``companion.policy.observations``
     hidden: tuple[int, ...] = (256, 256)
@@ -52,6 +53,8 @@ class DaggerConfig:
         if self.observation not in observations.SIZES:
             known = list(observations.SIZES)
             raise InputError(f"unknown observation '{self.observation}'{nearest(self.observation, known)}")
+        if self.head not in RANKINGS:
+            raise InputError(f"unknown head '{self.head}'{nearest(self.head, list(RANKINGS))}")
         if self.teacher not in TEACHERS:
             raise InputError(f"unknown teacher '{self.teacher}'{nearest(self.teacher, list(TEACHERS))}")
         for field in ("rounds", "flights", "steps"):
@@ -73,7 +76,7 @@ class DaggerConfig:
 
     def policy_spec(self) -> PolicySpec:
         """What the numbers of the policy mean."""
-        return PolicySpec(self.observation, head="headings", decoder_params=DecoderParams(headings_m=self.headings_m))
+        return PolicySpec(self.observation, self.head, decoder_params=DecoderParams(headings_m=self.headings_m))
 
     def share_of_expert(self, number: int) -> float:
         """Share of decisions that the teacher steers in a round, from 0."""

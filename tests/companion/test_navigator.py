@@ -179,6 +179,16 @@ def test_with_no_way_out_it_holds_where_it_is_and_keeps_asking() -> None:
     assert gaps == pytest.approx(PARAMS.policy.retry_s, abs=DT_S + 1e-9)
 
 
+def test_the_course_of_the_last_accepted_path_outlasts_it() -> None:
+    pilot, record = in_rl()
+    end = record.memory.engaged.path.vertices_ne_m[-1]
+    course_rad = record.memory.engaged.course_rad
+    assert course_rad == pytest.approx(math.atan2(end[1], end[0]), abs=0.1)  # it stands where the path begins
+    pilot.eye = Eye(world(CAGE))
+    caged = pilot.ticks(30)[-1].memory.engaged
+    assert caged.path is None and abs(caged.course_rad) <= math.pi
+
+
 def test_a_path_that_vanishes_in_flight_is_braked_for() -> None:
     pilot, _ = in_rl()
     pilot.eye = Eye(world(CAGE))
