@@ -3,7 +3,6 @@
 Small nets spend their time between kernels: one vector takes a few calls a step, a list of weights takes a hundred.
 """
 
-import math
 from typing import Any
 
 import torch
@@ -29,17 +28,18 @@ class Adam:
         self._parameters = list(net.parameters())
         self.weights = side_by_side(net)
         self._mean, self._square = torch.zeros_like(self.weights), torch.zeros_like(self.weights)
-        self._steps, self._rate = 0, 0.0
+        self._steps = torch.zeros((), device=self.weights.device)
+        self._rate = 0.0
 
     def step(self, loss: Tensor, rate: float) -> None:
         """One step; slopes of this net alone, whatever else the loss went through."""
         slope = torch.cat([part.reshape(-1) for part in torch.autograd.grad(loss, self._parameters)])
-        self._steps, self._rate = self._steps + 1, rate
-        self._mean.lerp_(slope, 1.0 - KEEP_MEAN)
-        self._square.mul_(KEEP_SQUARE).addcmul_(slope, slope, value=1.0 - KEEP_SQUARE)
-        unbiased = math.sqrt(1.0 - KEEP_SQUARE**self._steps)
-        size = self._square.sqrt().add_(LEAST * unbiased)
-        self.weights.addcdiv_(self._mean, size, value=-rate * unbiased / (1.0 - KEEP_MEAN**self._steps))
+        self._steps, self._rate = self._steps + 1.0, rate
+        moved = ([self.weights], [slope], [self._mean], [self._square], [], [self._steps])
+        torch._fused_adam_(
+            *moved, lr=rate, beta1=KEEP_MEAN, beta2=KEEP_SQUARE, eps=LEAST,
+            weight_decay=0.0, amsgrad=False, maximize=False,
+        )  # fmt: skip
 
     def state_dict(self) -> dict[str, Any]:
         """Moments, steps and the rate of the last one."""
@@ -49,4 +49,4 @@ class Adam:
         """As it was when ``state_dict`` was called."""
         self._mean.copy_(state["mean"])
         self._square.copy_(state["square"])
-        self._steps, self._rate = int(state["steps"]), float(state["rate"])
+        self._steps, self._rate = state["steps"].to(self._steps), float(state["rate"])
