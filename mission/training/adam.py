@@ -35,10 +35,9 @@ class Adam:
         """One step; slopes of this net alone, whatever else the loss went through."""
         slope = torch.cat([part.reshape(-1) for part in torch.autograd.grad(loss, self._parameters)])
         self._steps, self._rate = self._steps + 1.0, rate
-        moved = ([self.weights], [slope], [self._mean], [self._square], [], [self._steps])
         torch._fused_adam_(
-            *moved, lr=rate, beta1=KEEP_MEAN, beta2=KEEP_SQUARE, eps=LEAST,
-            weight_decay=0.0, amsgrad=False, maximize=False,
+            [self.weights], [slope], [self._mean], [self._square], [], [self._steps],
+            lr=rate, beta1=KEEP_MEAN, beta2=KEEP_SQUARE, eps=LEAST, weight_decay=0.0, amsgrad=False, maximize=False,
         )  # fmt: skip
 
     def state_dict(self) -> dict[str, Any]:
