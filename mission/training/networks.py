@@ -52,12 +52,13 @@ class TwinCritic(nn.Module):
             bound = 1.0 / math.sqrt(here)  # as nn.Linear begins
             for parameters, shape in ((self.weights, (2, here, there)), (self.biases, (2, 1, there))):
                 parameters.append(nn.Parameter((2.0 * torch.rand(shape, generator=generator) - 1.0) * bound))
+        self._layers = tuple(zip(self.weights, self.biases, strict=True))  # a ParameterList is slow to read
 
     def forward(self, obs: Tensor, action: Tensor) -> Tensor:
         """Values (2, n) of both critics for n pairs."""
         values = torch.cat((obs, action), dim=1).expand(2, -1, -1)
-        last = len(self.weights) - 1
-        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+        last = len(self._layers) - 1
+        for layer, (weight, bias) in enumerate(self._layers):
             values = torch.baddbmm(bias, values, weight)
             if layer < last:
                 values = torch.relu_(values)
@@ -66,8 +67,8 @@ class TwinCritic(nn.Module):
     def first(self, obs: Tensor, action: Tensor) -> Tensor:
         """Values (n,) of the first critic alone, which the actor climbs."""
         values = torch.cat((obs, action), dim=1)
-        last = len(self.weights) - 1
-        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+        last = len(self._layers) - 1
+        for layer, (weight, bias) in enumerate(self._layers):
             values = torch.addmm(bias[0], values, weight[0])
             if layer < last:
                 values = torch.relu_(values)
