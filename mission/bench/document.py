@@ -113,7 +113,7 @@ def _made(entries: list[Flown]) -> str:
 
 
 def _machines(told: list[str]) -> str:
-    """Each machine once, with the range of its loads (``run.machine``)."""
+    """Each machine once, with the range of its loads (``provenance.machine``)."""
     loads: dict[tuple[str, str], list[float]] = {}
     for text in told:
         machine, _, rest = text.partition(", load ")

@@ -12,7 +12,7 @@ from mission.bench import theory
 from mission.bench.rows import Row
 from mission.bench.scores import by_cell
 from mission.figures_style import GRID_COLOUR, INK, MUTED
-from mission.training.scores import wilson
+from mission.rates import wilson
 
 DPI = 110
 SEEN_M, HULL_M, TRUNK_M, POLE_M = 6.0, 0.2, 0.3, 0.75

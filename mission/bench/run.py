@@ -5,9 +5,6 @@ runs of other settings are never mixed in) and ``failures/``. Interrupt at any t
 """
 
 import json
-import os
-import platform
-import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -20,6 +17,7 @@ from mission.bench.rows import Row
 from mission.bench.suites import Suite, suite_named
 from mission.cluster import on_cluster
 from mission.errors import InputError
+from mission.provenance import commit, machine
 from mission.side_by_side import side_by_side
 
 RUNS, SETUP, FAILURES = "runs.csv", "setup.json", "failures"
@@ -106,28 +104,6 @@ def read_rows(folder: Path, suite: Suite, runs: int | None = None) -> list[Row]:
     names = [cell.name for cell in suite.cells]
     found = [row for row in rows.read(folder / RUNS) if row.cell in names and row.run < most]
     return sorted(found, key=lambda row: (names.index(row.cell), row.run))
-
-
-def machine() -> str:
-    """Where this runs, and how busy that was: wall times of decisions depend on both."""
-    load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores when begun"
-    return f"{platform.system()} {platform.machine()}, Python {platform.python_version()}, {load}"
-
-
-def commit() -> str:
-    """Of the checkout that this runs from, '+' when it was changed since; 'unknown' outside of one."""
-    here = Path(__file__).parent
-    try:
-        found = subprocess.run(
-            ["git", "describe", "--always", "--dirty=+", "--exclude=*"],
-            cwd=here,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
-    return found.stdout.strip()
 
 
 def _claim(path: Path, spec: SuiteSpec, entry: Entry) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mission.bench.rows import Row
 from mission.errors import InputError
-from mission.training.scores import wilson
+from mission.rates import wilson
 
 BARN_M_S: Final = 2.0  # at which the reference path gives the optimal time
 CLIP_05: Final = 2.0  # optimal times below which no more is won: 2024 on, best 0.5

@@ -17,8 +17,8 @@ import numpy as np
 from companion.core.frames import wrap_rad
 from companion.core.types import F64
 from companion.policy.learned import LearnedPolicy
-from mission.bench.run import commit, machine
 from mission.errors import FlightError
+from mission.provenance import commit, machine
 from mission.training.checkpoint import load_newest, write_whole
 from mission.training.env import SwiftNavEnv
 from mission.training.env_config import navigator_params

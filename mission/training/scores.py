@@ -1,6 +1,5 @@
 """Which figures sum up several judged flights?  Rates with Wilson intervals, path quality, switching, time; pure."""
 
-import math
 import statistics
 from collections import Counter
 from collections.abc import Sequence
@@ -10,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from companion.checker.checker import VerdictKind
-
-Z_95 = 1.959964  # two-sided 95 % of the normal distribution
-Interval = tuple[float, float]
+from mission.rates import wilson
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,17 +38,6 @@ class FlightFigures:
     def path_ratio(self) -> float | None:
         """Flown to shortest."""
         return self.path_m / self.shortest_m if self.shortest_m else None
-
-
-def wilson(successes: int, count: int) -> Interval:
-    """95 % interval of a rate; (0, 1) without trials."""
-    if count == 0:
-        return 0.0, 1.0
-    share, z2 = successes / count, Z_95**2
-    centre = (share + z2 / (2 * count)) / (1 + z2 / count)
-    half = Z_95 / (1 + z2 / count) * math.sqrt(share * (1 - share) / count + z2 / (4 * count**2))
-    low, high = max(0.0, centre - half), min(1.0, centre + half)
-    return (0.0 if successes == 0 else low), (1.0 if successes == count else high)
 
 
 def summary(flights: Sequence[FlightFigures]) -> dict[str, Any]:

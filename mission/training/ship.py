@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from companion.policy.store import POLICIES, read_policy, save_policy
-from mission.bench.run import commit
 from mission.errors import FlightError, InputError
 from mission.flight_log import read_rows
+from mission.provenance import commit
 from mission.training.baselines import RANDOM, STRAIGHT
 from mission.training.evaluate import EvalSpec, fly_many
 from mission.training.fleet import seed_folder

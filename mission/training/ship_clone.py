@@ -13,9 +13,9 @@ from typing import Any
 
 from companion.policy.expert import GeometricExpert
 from companion.policy.store import POLICIES, read_policy, save_policy
-from mission.bench.run import commit
 from mission.errors import FlightError, InputError
 from mission.flight_log import read_rows
+from mission.provenance import commit
 from mission.training.dagger_config import FILE, read_config
 from mission.training.evaluate import EvalSpec, fly_one
 from mission.training.scores import FlightFigures

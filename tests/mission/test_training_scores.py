@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mission.errors import InputError
+from mission.rates import wilson
 from mission.training.baselines import RandomPolicy, check_policy
 from mission.training.evaluate import EvalSpec, fly_many, fly_one
 from mission.training.flights import plan_in
-from mission.training.scores import FlightFigures, summary, wilson
+from mission.training.scores import FlightFigures, summary
 
 WON = FlightFigures(
     seed=1,
