@@ -60,6 +60,9 @@ class LimitsParams:
         0.2, "LIM_SWERVE_LAG", "scan age, link, tick and tilt lag before it bites", "s", 0.0, 1.0
     )
     ramp_m_s2: float = param(4.0, "LIM_RAMP", "deceleration of the ramp into a hold", "m/s2", 0.5, 6.0)
+    hold_gain_1_s: float = param(
+        2.2, "LIM_HOLD_GAIN", "acceleration asked per velocity that the ramp does not have", "1/s", 0.0, 2.5
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +198,8 @@ def hold(
     """Stop and stand. Pass the memory back each tick; None asks anew.
 
     From ``hold_from_m_s`` up a position hold at the place of the request is the shortest stop; below it, a ramp of
-    position, velocity and acceleration is.
+    position, velocity and acceleration is. What the vehicle still gains after the request, and what wind adds, the
+    ramp does not know: that is braked by its own acceleration, or a stop from 0.3 m/s took 0.28 m beside a trunk.
     """
     kept = memory or HoldMemory(state.t_s, state.pos_ned_m, state.vel_ned_m_s, yaw_rad)
     speed = math.hypot(float(kept.vel_ned_m_s[0]), float(kept.vel_ned_m_s[1]))
@@ -208,6 +212,7 @@ def hold(
         if elapsed < whole:
             vel[:2] = course * (speed - params.ramp_m_s2 * elapsed)
             acc[:2] = course * -params.ramp_m_s2
+        acc[:2] = _bounded(acc[:2] + params.hold_gain_1_s * (vel[:2] - state.vel_ned_m_s[:2]), params.decel_m_s2)
     return kept, Setpoint(state.t_s, pos, vel, acc, kept.yaw_rad)
 
 
@@ -226,6 +231,14 @@ def _corner(before: geometry.Segment, after: geometry.Segment, cut_m: float) -> 
     by_cut = cut_m / (1.0 / math.cos(half_angle) - 1.0)
     radius = min(by_cut, half_piece / math.tan(half_angle))
     return radius, radius * math.tan(half_angle)
+
+
+def _bounded(vector: F64, most: float) -> F64:
+    """The vector (2,), no longer than ``most``; zero if it is not finite."""
+    size = math.hypot(float(vector[0]), float(vector[1]))
+    if not math.isfinite(size):
+        return np.zeros(2)
+    return vector if size <= most else vector * (most / size)
 
 
 def _known(value: float) -> float:

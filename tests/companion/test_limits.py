@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from point_mass import DOWN_M, PointMass
 
 from companion.core import geometry
-from companion.core.types import F64
+from companion.core.types import F64, Setpoint
 from companion.guidance import limits
 from companion.guidance.follower import FollowerParams, Target, follow, progress
 from companion.guidance.limits import Ahead, LimitsParams
@@ -187,6 +187,29 @@ def test_a_hold_ends_at_rest_where_its_setpoint_says(speed_m_s: float) -> None:
     assert vehicle.pos == pytest.approx(setpoint.pos_ned_m[:2], abs=0.05)
     at_once = speed_m_s >= PARAMS.hold_from_m_s or speed_m_s == 0.0
     assert setpoint.pos_ned_m[0] == pytest.approx(0.0 if at_once else speed_m_s**2 / (2.0 * PARAMS.ramp_m_s2))
+
+
+def test_a_hold_brakes_what_the_vehicle_gains_after_it_was_asked_for() -> None:
+    soft = dataclasses.replace(PARAMS, hold_gain_1_s=0.0)
+    assert held_while_speeding_up(soft) > 0.2
+    assert held_while_speeding_up(PARAMS) < 0.16
+
+
+def held_while_speeding_up(params: LimitsParams) -> float:
+    """Metres from where a hold is asked for at 0.3 m/s, and rising by 2.75 m/s2, to the farthest point."""
+    vehicle, memory, farthest = PointMass(lag_s=0.2), None, 0.0
+    forward = np.array([1.0, 0.0, 0.0])
+    while vehicle.vel[0] < 0.3:
+        state = vehicle.state()
+        velocity = state.vel_ned_m_s[0] + PARAMS.rise_m_s2 / PARAMS.response_1_s
+        push = FollowerParams().acc_gain_1_s * PARAMS.rise_m_s2 / PARAMS.response_1_s
+        vehicle.tick(Setpoint(state.t_s, state.pos_ned_m, velocity * forward, push * forward, None))
+    began = float(vehicle.pos[0])
+    for _ in range(130):
+        memory, setpoint = limits.hold(vehicle.state(), memory, 0.0, params)
+        vehicle.tick(setpoint)
+        farthest = max(farthest, float(vehicle.pos[0]) - began)
+    return farthest
 
 
 def test_with_the_clamp_off_the_free_length_bounds_no_speed() -> None:
