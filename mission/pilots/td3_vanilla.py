@@ -2,7 +2,7 @@
 
 S. Fujimoto, H. van Hoof, D. Meger, "Addressing function approximation error in actor-critic methods", ICML 2018, as the
 paper's vanilla baseline: the actor that was trained in ``SwiftNavLowLevel-v0``, with that environment's observation,
-action and 5 Hz. Landing is everybody's. Kept as ``actor.safetensors`` and ``card.json``, as the other policies are.
+action and hold. Landing is everybody's. Kept as ``actor.safetensors`` and ``card.json``, as the other policies are.
 """
 
 import hashlib
@@ -29,8 +29,9 @@ from mission.pilots.cockpit import Recipe, View, Wish, shortened
 
 FOLDER = POLICIES.parent / "baselines" / "td3_vanilla"
 ACTOR, CARD = "actor.safetensors", "card.json"
-FORMAT = 1
+FORMAT = 2
 ACTIONS = 3  # velocity ahead and to the right, yaw rate
+SLACK_S = 0.005  # less than half a scan
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ class LowLevelCard:
     """What the numbers mean, and where they come from."""
 
     observation: str = "goal"  # or paper, see ``companion.policy.observations``
-    hold_ticks: int = 5  # scans that one action is flown for
+    hold_s: float = 0.2  # that one action is flown for
     yaw_rate_rad_s: float = 1.2  # of action 1
     training: dict[str, Any] = field(default_factory=dict)
 
@@ -48,7 +49,7 @@ class Own:
     """The action in force."""
 
     action: F64  # (3,)
-    ticks_left: int
+    until_t_s: float
 
 
 class Td3Vanilla(Recipe):
@@ -59,13 +60,13 @@ class Td3Vanilla(Recipe):
 
     def __init__(self, folder: Path = FOLDER) -> None:
         """Raises InputError where there is no trained actor, or one that does not fit."""
-        self._card, self._actor = load_low_level(folder)
+        self.card, self._actor = load_low_level(folder)
 
     def steer(self, view: View, own: Own | None) -> tuple[Own, Wish]:
         """See ``Recipe.steer``."""
-        due = own is None or own.ticks_left == 0
+        due = own is None or view.state.t_s >= own.until_t_s
         if own is None or due:
-            own = Own(self._decided(view), self._card.hold_ticks)
+            own = Own(self._decided(view), view.state.t_s + self.card.hold_s - SLACK_S)
         yaw = yaw_rad(view.state.q_ned_frd)
         ahead, right = (view.task.cruise_m_s * own.action[:2]).tolist()
         velocity = shortened(
@@ -79,9 +80,9 @@ class Td3Vanilla(Recipe):
             None,
             None,
         )
-        turn_rad = self._card.yaw_rate_rad_s * float(own.action[2]) * max(view.dt_s, 0.0)
+        turn_rad = self.card.yaw_rate_rad_s * float(own.action[2]) * max(view.dt_s, 0.0)
         wish = Wish("td3", setpoint=setpoint, course_rad=view.yaw_sp_rad + turn_rad, decided=due)
-        return Own(own.action, own.ticks_left - 1), wish
+        return own, wish
 
     def _decided(self, view: View) -> F64:
         """The action (3,) for what is seen now; none for what is no number."""
@@ -98,7 +99,7 @@ class Td3Vanilla(Recipe):
             seen,
             view.start_ne_m,
         )
-        output = self._actor.forward(observe(self._card.observation, query, None, view.params.map))
+        output = self._actor.forward(observe(self.card.observation, query, None, view.params.map))
         return squashed(output) if np.isfinite(output).all() else np.zeros(ACTIONS)
 
 
@@ -110,7 +111,7 @@ def load_low_level(folder: Path) -> tuple[LowLevelCard, Actor]:
         data = json.loads((folder / CARD).read_text(encoding="utf-8"))
         weights = (folder / ACTOR).read_bytes()
         actor = from_arrays(load(weights))
-        card = LowLevelCard(data["observation"], data["hold_ticks"], data["yaw_rate_rad_s"], data["training"])
+        card = LowLevelCard(data["observation"], data["hold_s"], data["yaw_rate_rad_s"], data["training"])
         sizes, expected = actor.sizes(), (SIZES[card.observation], ACTIONS)
     except (OSError, ValueError, KeyError, IndexError, TypeError, SafetensorError) as error:
         raise InputError(f"{folder}: no low-level policy: {error!r}") from error

@@ -64,7 +64,7 @@ class SwiftNavLowLevelEnv(gymnasium.Env[F32, F32]):
         self.config = config or EnvConfig()
         if self.config.observation not in OBSERVATIONS:
             raise InputError(f"observation '{self.config.observation}' needs a map: the baseline has {OBSERVATIONS}")
-        self._hold_ticks = round(HOLD_S * self.config.scan_rate_hz) if hold_ticks is None else hold_ticks
+        self._hold_ticks = ticks_of(self.config) if hold_ticks is None else hold_ticks
         if self._hold_ticks < 1:
             raise InputError(f"hold_ticks {hold_ticks} is below 1")
         self._params = navigator_params(self.config)
@@ -177,6 +177,11 @@ class SwiftNavLowLevelEnv(gymnasium.Env[F32, F32]):
             self._start_ne_m,
         )
         return observe(self.config.observation, query, None, self._params.map).astype(np.float32)
+
+
+def ticks_of(config: EnvConfig) -> int:
+    """Scans that an action is flown for."""
+    return round(HOLD_S * config.scan_rate_hz)
 
 
 NO_MODES: dict[str, Any] = {

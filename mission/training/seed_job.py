@@ -10,19 +10,21 @@ import torch
 
 from companion.core.types import F64
 from companion.navigator.decide import policy_named
+from companion.policy.actor import Actor
 from companion.policy.decoder import encode_detour
 from companion.policy.expert import GeometricExpert
 from companion.policy.interface import Policy
 from companion.policy.learned import LearnedPolicy
 from companion.policy.store import Card, save_policy
 from mission.errors import InputError
+from mission.pilots.td3_vanilla import LowLevelCard, save_low_level
 from mission.training.baselines import RANDOM, STRAIGHT, RandomPolicy, StraightPolicy
 from mission.training.env import SwiftNavEnv
 from mission.training.env_config import flight_spec, navigator_params
 from mission.training.evaluate import fly_plan
 from mission.training.exploration import Exploration
 from mission.training.fleet import Member, OnUpdate, run_fleet
-from mission.training.low_level import SwiftNavLowLevelEnv
+from mission.training.low_level import YAW_RATE_MAX_RAD_S, SwiftNavLowLevelEnv, ticks_of
 from mission.training.metrics import Row
 from mission.training.mirror import half_mirrored
 from mission.training.parts import F32, Parts
@@ -48,12 +50,12 @@ class SeedJob:
     spec: RunSpec
 
     def __call__(self, seed: int, folder: Path) -> Iterator[Status]:
-        """Train in ``folder`` from where it stands; leaves a policy there that can fly, unless it steers."""
+        """Train in ``folder`` from where it stands; leaves a policy there that can fly."""
         learner, parts = assemble(self.spec, seed)
         trainer = Trainer(parts, self.spec.preset.training, self.spec.until, seed, folder)
         for status in trainer.run():
-            if status.state == "done" and not self.spec.preset.env.low_level:
-                save_policy(folder / POLICY_FOLDER, learner.actor(), _card(self.spec, seed, status))
+            if status.state == "done":
+                _save(folder / POLICY_FOLDER, learner.actor(), self.spec, seed, status)
             yield status
 
 
@@ -169,7 +171,8 @@ def _mirror(spec: RunSpec) -> Any:
     return mirrored
 
 
-def _card(spec: RunSpec, seed: int, status: Status) -> Card:
+def _save(folder: Path, actor: Actor, spec: RunSpec, seed: int, status: Status) -> None:
+    """A waypoint policy, or one that steers by itself: ``companion.policy.store``, ``mission.pilots.td3_vanilla``."""
     training = {
         "world": spec.world,
         "seed": seed,
@@ -179,7 +182,12 @@ def _card(spec: RunSpec, seed: int, status: Status) -> Card:
         "decisions": status.progress.decisions,
         "updates": status.progress.updates,
     }
+    env = spec.preset.env
+    if env.low_level:
+        hold_s = ticks_of(env) / env.scan_rate_hz
+        card = LowLevelCard(env.observation, hold_s, YAW_RATE_MAX_RAD_S, training)
+        save_low_level(folder, actor, card)
+        return
     limits = ("trained for this world alone",) if spec.world.split(":")[0] not in KINDS else ()
-    return Card(
-        f"{Path(spec.world).stem.replace(':', '_')}_seed{seed}", spec.preset.env.policy_spec(), training, {}, limits
-    )
+    name = f"{Path(spec.world).stem.replace(':', '_')}_seed{seed}"
+    save_policy(folder, actor, Card(name, env.policy_spec(), training, {}, limits))

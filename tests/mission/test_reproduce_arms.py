@@ -8,7 +8,7 @@ import pytest
 from mission.errors import InputError
 from mission.reproduce.arms import GROUPS, QUICK_ARMS, load_table
 from mission.reproduce.run import check
-from mission.training.low_level import HOLD_S
+from mission.training.low_level import ticks_of
 from mission.training.presets import load_preset
 
 MINE = """
@@ -82,7 +82,7 @@ def test_the_baseline_learns_no_less_often_a_tick_than_the_arm_whose_ticks_it_ge
     table = load_table()
     for name in ("vanilla", "vanilla_paper"):
         preset = table.arm(name).preset
-        baseline, hold_ticks = preset.training.updates_per_decision, round(HOLD_S * preset.env.scan_rate_hz)
+        baseline, hold_ticks = preset.training.updates_per_decision, ticks_of(preset.env)
         assert table.arm(name).ticks_of is not None
         swift = table.arm(table.arm(name).ticks_of or "").preset.training.updates_per_decision
         assert baseline / hold_ticks > swift / 19  # ticks a decision, as trained

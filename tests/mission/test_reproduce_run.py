@@ -8,6 +8,7 @@ import pytest
 from reproduce_kit import TINY, finish, write_arm
 
 from mission.errors import InputError
+from mission.pilots.td3_vanilla import Td3Vanilla
 from mission.reproduce import run
 from mission.reproduce.arms import load_table
 from mission.reproduce.document import text_of, write_docs, write_readme
@@ -80,6 +81,8 @@ def test_a_seed_broken_off_and_taken_up_again_ends_like_one_never_broken_off(tmp
     assert vanilla is not None
     longest = 6 * 25 + 1  # ticks of an episode at most
     assert 0 <= vanilla["ticks"] - swift["ticks"] <= longest or vanilla["episodes"] == 3
+    steers = Td3Vanilla(arm_folder(tmp_path / "whole", table.arm("vanilla")) / "seed_1" / "policy")
+    assert steers.card.hold_s == pytest.approx(0.16)  # two scans of 80 ms
 
 
 def test_what_is_done_is_not_done_again(tmp_path: Path, fleet: Fleet) -> None:
