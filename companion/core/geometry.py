@@ -219,7 +219,7 @@ def _brushed(cut: "_Cut", points_ned_m: F64, reach_m: float) -> F64:
     """The points in a rectangle round one of the pieces: every point within reach_m is among them."""
     along, lateral = _in_segments(cut, points_ned_m)
     inside = (np.abs(lateral) < reach_m) & (np.abs(along - cut.half_m) < cut.half_m + reach_m)
-    brushed: F64 = points_ned_m.compress(inside.any(axis=0), axis=0)
+    brushed: F64 = points_ned_m.compress(np.logical_or.reduce(inside), axis=0)
     return brushed
 
 

@@ -104,7 +104,8 @@ def _without_refuted(grid: GridMap, pos_ne_m: F64, free_m: F64, margin_m: float)
     places = zip(pos_ne_m[0].tolist(), grid.corner, strict=True)
     north, east = (max(math.floor(place_m / grid.cell_m) - corner - reach, 0) for place_m, corner in places)
     width = 2 * reach + 1
-    row, column = (grid.hit_t[north : north + width, east : east + width] > NEVER).nonzero()
+    known = grid.hit_t[north : north + width, east : east + width] > NEVER
+    row, column = np.divmod(known.ravel().nonzero()[0], known.shape[1])
     cells = (row + north) * n + (column + east)
     hits = grid.hit_ne_m.reshape(-1, 2).take(cells, axis=0).astype(np.float64)
     hit_t = grid.hit_t.copy()

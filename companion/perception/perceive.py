@@ -96,9 +96,10 @@ def perceive(
     else:
         tracks = follow(before.tracks, grid.moved_ne_m, pos_ne_m, state.t_s, dt_s, mover_params)
     static, swept = occupied_points(grid, state.t_s, map_params), hazards(tracks, mover_params)
-    points = static
+    points, hazard = static, swept
     if len(swept):
         points = np.concatenate([static, discs(avoidable(swept, pos_ne_m, radius_m, mover_params), mover_params)])
+        hazard = discs(swept, mover_params)
     density = local_density(flat.bearing_range_m, params.density_radius_m)
     scale = sensitivity(density, params)
     score = safety_score(flat.bearing_range_m, params.near_m * scale, params.far_m * scale)
@@ -108,7 +109,7 @@ def perceive(
         grid,
         tracks,
         static,
-        discs(swept, mover_params),
+        hazard,
         points,
         flat.bearing_range_m,
         d_min if d_min <= params.sense_radius_m else math.inf,

@@ -45,15 +45,15 @@ def flatten(scan: Scan, state: VehicleState, lidar_up_m: float, ground_margin_m:
         scan, rotation, _trusted_height_m(lidar_up_m - float(state.pos_ned_m[2]), ground_margin_m)
     )
     hit = scan.range_m < ground_m  # false for nan and inf as well: inf < inf
-    known = ~np.isnan(scan.range_m)
-    proven_m = np.where(known, np.minimum(np.minimum(scan.range_m, scan.range_max_m), ground_m), 0.0)
+    unknown = np.isnan(scan.range_m)
+    proven_m = np.where(unknown, 0.0, np.minimum(np.minimum(scan.range_m, scan.range_max_m), ground_m))
+    seen_m = np.where(hit | unknown, scan.range_m, np.inf)
 
     forward, right = _in_body_plane(rotation)
     stretch = 1.0 / np.hypot(forward, right)  # |P (cos b, sin b)|: horizontal metres per slant metre
     sector = _sector_of(np.arctan2(right, forward), scan)
-    bin_hit = hit.take(sector)
-    bins = bin_hit.nonzero()[0]
-    horizontal_m = scan.range_m.take(sector) * stretch
+    bins = hit.take(sector).nonzero()[0]
+    horizontal_m = seen_m.take(sector) * stretch
     polar = PolarScan(
         t_s=scan.t_s,
         pos_ne_m=state.pos_ned_m[:2].copy(),
@@ -62,8 +62,7 @@ def flatten(scan: Scan, state: VehicleState, lidar_up_m: float, ground_margin_m:
         hit_m=horizontal_m.take(bins),
         hit_sector=sector.take(bins),
     )
-    nothing_m = np.where(known, np.inf, np.nan).take(sector)
-    return Flattened(polar, _at_bearings(np.where(bin_hit, horizontal_m, nothing_m), rotation))
+    return Flattened(polar, _at_bearings(horizontal_m, rotation))
 
 
 def _all_round(scan: Scan) -> Scan:
