@@ -174,15 +174,15 @@ def velocity_stop_needed(
 
     The tube is never wider than the present clearance, else the vehicle would freeze beside a tree.
     """
-    north, east = float(vel_ned_m_s[0]), float(vel_ned_m_s[1])
+    (north, east), (north_m, east_m) = vel_ned_m_s[:2].tolist(), pos_ned_m[:2].tolist()
     speed = math.hypot(north, east)
-    if not math.isfinite(speed) or not np.isfinite(pos_ned_m[:2]).all():
+    if not (math.isfinite(speed) and math.isfinite(north_m) and math.isfinite(east_m)):
         return True
     if speed < STANDING_M_S or len(points_ned_m) == 0:
         return False
     reach = stopping_distance(speed, params.decel_m_s2, params.stop_tau_s)
-    here = np.array(pos_ned_m[:2], dtype=np.float64)
-    straight = np.array([here, here + np.array([north, east]) * (reach / speed)])
+    share = reach / speed
+    straight = np.array([[north_m, east_m], [north_m + north * share, east_m + east * share]])
     wide = radius_m + params.stop_margin_m
     near = geometry.points_near(straight, points_ned_m, wide)
     if len(near) == 0:
