@@ -22,7 +22,9 @@ def test_its_card_says_how_it_was_trained() -> None:
     assert "tight" in pilot_names()
     assert card.spec == preset.policy_spec() and actor.sizes()[1:-1] == preset.hidden
     assert {card.training["world"], card.training["profile"]} == {preset.world, preset.profile}
-    assert card.evaluation["cellular"]["guard_off"]["success"] > 0.8
+    assert card.spec.head == "centred"
+    alone = card.evaluation["cellular"]["guard_off"]
+    assert alone["success"] > 0.8 and alone["contact"] == 0.0
 
 
 @pytest.mark.parametrize("seed", [100, 107])
