@@ -147,7 +147,7 @@ def test_rates_fall_evenly_to_a_tenth_and_stay_there() -> None:
     for k in range(7):
         learner.update(batch(seed=k))
         state = learner.state_dict()
-        rates.append([state[f"{name}_optimiser"]["rate"] for name in ("critic", "actor")])
+        rates.append([state[f"{name}_optimiser"]["param_groups"][0]["lr"] for name in ("critic", "actor")])
     shares = np.array([1.0, 0.775, 0.55, 0.325, 0.1, 0.1, 0.1, 0.1])
     assert np.array(rates)[:, 0] == pytest.approx(2e-3 * shares[:-1])
     assert np.array(rates)[:, 1] == pytest.approx(1e-3 * shares[1:])
