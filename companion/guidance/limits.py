@@ -56,9 +56,6 @@ class LimitsParams:
         0.0,
         7.0,
     )
-    swerve_lag_s: float = param(
-        0.2, "LIM_SWERVE_LAG", "scan age, link, tick and tilt lag before it bites", "s", 0.0, 1.0
-    )
     ramp_m_s2: float = param(4.0, "LIM_RAMP", "deceleration of the ramp into a hold", "m/s2", 0.5, 6.0)
     hold_gain_1_s: float = param(
         2.2, "LIM_HOLD_GAIN", "acceleration asked per velocity that the ramp does not have", "1/s", 0.0, 2.5

@@ -19,10 +19,7 @@ LEAST_M_S = 3.0  # slower than this, braking is quicker than to step aside by a 
 TURN_MAX_RAD = math.radians(60.0)  # farther round than this, brake
 TURNS_RAD = np.radians([10.0, 20.0, 30.0, 40.0, 50.0])
 ARC_PIECES = 5
-SURE_SHARE = 0.8  # of the acceleration asked for that is reckoned with, where braking would do
-FULL_ROOM_M = 0.3  # clearance beyond which a side is as good as any, where braking would do
-ROOM_M = 0.2  # clearance of a track that is preferred to braking in time
-LATE_ROOM_M = -0.1  # the same where braking would touch anyway, and a scan makes things wider than they are
+ROOM_M = -0.1  # clearance of a track that is begun: braking would touch anyway, and a scan makes things wider than they are
 OFF_PLAN_M = 0.15  # a side away from the planned way must have so much more clearance
 PUSH_S = 0.3  # the velocity asked for runs ahead of the vehicle's by so much of the acceleration
 TURN_GAP_S = 0.15  # two scans at 15 Hz: a swerve that paused for longer is over
@@ -44,7 +41,6 @@ class Motion:
 
     speed_m_s: float
     course_rad: float
-    lag_s: float  # before it turns
     acc_m_s2: float
     stop_m: float  # from its speed to standstill
 
@@ -59,7 +55,7 @@ def turn_aside(
 ) -> Swerve | None:
     """To the side with more room, the same as in the tick before; None: brake.
 
-    Braking goes first where it ends in time, unless a side has room to spare.
+    Braking goes first where it ends in time.
 
     Args:
         before: of the tick before; what turned longer ago is forgotten.
@@ -76,24 +72,19 @@ def turn_aside(
     if before is not None and not (state.t_s - before.t_s <= TURN_GAP_S and turned_rad(before, course) < TURN_MAX_RAD):
         before = None
     here, stop_m = state.pos_ned_m[:2], stopping_distance(speed, params.decel_m_s2, params.stop_tau_s)
-    sure = Motion(speed, course, params.swerve_lag_s, SURE_SHARE * params.swerve_m_s2, stop_m)
-    longest_m = geometry.length(track_of(here, sure, float(TURNS_RAD[-1])))
+    motion = Motion(speed, course, params.swerve_m_s2, stop_m)
+    longest_m = geometry.length(track_of(here, motion, float(TURNS_RAD[-1])))
     near = geometry.points_near(here[None], points_ne_m, longest_m + radius_m)
     straight = here + stop_m * np.array([[0.0, 0.0], [math.cos(course), math.sin(course)]])
-    late = geometry.nearest_distance(straight, near) < radius_m
-    motion = Motion(speed, course, 0.0, params.swerve_m_s2, stop_m) if late else sure
+    if geometry.nearest_distance(straight, near) >= radius_m:
+        return None
     room_m = {}
     for side in (1.0, -1.0) if before is None else (before.side,):
         tracks = (track_of(here, motion, side * float(turn)) for turn in TURNS_RAD)
         room_m[side] = max(geometry.nearest_distance(track, near) for track in tracks) - radius_m
     planned = 0.0 if planned_rad is None else wrap_rad(planned_rad - course)
-    best = max(
-        room_m,
-        key=lambda side: (
-            min(room_m[side], math.inf if late else FULL_ROOM_M) + (OFF_PLAN_M if side * planned > 0.0 else 0.0)
-        ),
-    )
-    if not room_m[best] > (LATE_ROOM_M if late and before is None else -math.inf if late else ROOM_M):
+    best = max(room_m, key=lambda side: room_m[side] + (OFF_PLAN_M if side * planned > 0.0 else 0.0))
+    if before is None and not room_m[best] > ROOM_M:
         return None
     return Swerve(course if before is None else before.course_rad, best, state.t_s)
 
@@ -109,10 +100,10 @@ def turned_rad(swerve: Swerve, course_rad: float) -> float:
 
 
 def track_of(pos_ne_m: F64, motion: Motion, turn_rad: float) -> F64:
-    """(k, 2) what the vehicle flies when it turns by that much: lag, arc, and straight on to standstill."""
+    """(k, 2) what the vehicle flies when it turns by that much: an arc, and straight on to standstill."""
     arc_m = abs(turn_rad) * motion.speed_m_s * motion.speed_m_s / motion.acc_m_s2
-    ways = np.array([motion.speed_m_s * motion.lag_s, *[arc_m / ARC_PIECES] * ARC_PIECES, motion.stop_m])
-    courses = motion.course_rad + turn_rad * np.array([0.0, *(np.arange(ARC_PIECES) + 0.5) / ARC_PIECES, 1.0])
+    ways = np.array([*[arc_m / ARC_PIECES] * ARC_PIECES, motion.stop_m])
+    courses = motion.course_rad + turn_rad * np.array([*(np.arange(ARC_PIECES) + 0.5) / ARC_PIECES, 1.0])
     moves = ways[:, None] * np.stack([np.cos(courses), np.sin(courses)], axis=1)
     track: F64 = np.concatenate([pos_ne_m[None], pos_ne_m + np.cumsum(moves, axis=0)])
     return track

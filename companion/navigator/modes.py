@@ -129,7 +129,12 @@ def _land(memory: Memory, engaged: Engagement, scene: Scene) -> Steered:
 
 
 def _swerved(memory: Memory, engaged: Engagement, scene: Scene, planned_rad: float | None) -> Steered | None:
-    """Past what a stop is due for, where the parameters allow it and a side is free; None: stop."""
+    """Past what a stop comes too late for, where the parameters allow it and a side is free; None: stop.
+
+    A stop that has begun goes on: half of it and half a swerve end in what either would have missed.
+    """
+    if engaged.stop is not None:
+        return None
     state, params = scene.state, scene.params
     points, radius_m = scene.percept.points_ne_m, params.vehicle.radius_m
     begun = swerve.turn_aside(engaged.swerve, state, points, radius_m, planned_rad, params.limits)
