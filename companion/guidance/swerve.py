@@ -20,6 +20,7 @@ TURN_MAX_RAD = math.radians(60.0)  # farther round than this, brake
 TURNS_RAD = np.radians([10.0, 20.0, 30.0, 40.0, 50.0])
 ARC_PIECES = 5
 ROOM_M = -0.1  # clearance of a track that is begun: braking would touch anyway, and a scan makes things wider
+IN_HAND_S = 0.07  # a stop is shorter than it is reckoned with by so much time at speed
 OFF_PLAN_M = 0.15  # a side away from the planned way must have so much more clearance
 PUSH_S = 0.3  # the velocity asked for runs ahead of the vehicle's by so much of the acceleration
 TURN_GAP_S = 0.15  # two scans at 15 Hz: a swerve that paused for longer is over
@@ -75,7 +76,7 @@ def turn_aside(
     motion = Motion(speed, course, params.swerve_m_s2, stop_m)
     longest_m = geometry.length(track_of(here, motion, float(TURNS_RAD[-1])))
     near = geometry.points_near(here[None], points_ne_m, longest_m + radius_m)
-    straight = here + stop_m * np.array([[0.0, 0.0], [math.cos(course), math.sin(course)]])
+    straight = here + (stop_m - IN_HAND_S * speed) * np.array([[0.0, 0.0], [math.cos(course), math.sin(course)]])
     if geometry.nearest_distance(straight, near) >= radius_m:
         return None
     room_m = {}
