@@ -54,6 +54,8 @@ class Tightness:
     aside: GridMap | None = None  # where it is tight: the map of the open, as it was last; None: it is open
     push_ne_m_s2: tuple[float, float] = (0.0, 0.0)  # of the wind
     calm: bool = True
+    best_m: float = math.inf  # least distance to the goal so far
+    best_t_s: float = 0.0  # when it was reached
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,6 +70,10 @@ class TightParams:
     density_enter: float = param(0.5, "SN_TI_ENTER", "Density from which it is tight", "", 0.0, 1.0)
     density_exit: float = param(0.3, "SN_TI_EXIT", "Density up to which it is open again", "", 0.0, 1.0)
     dwell_s: float = param(2.0, "SN_TI_DWELL", "Least time between two changes", "s", 0.1, 60.0)
+    vain_s: float = param(
+        8.0, "SN_TI_VAIN", "The set flies at most so long without coming nearer to the goal", "s", 1.0, 300.0
+    )
+    again_s: float = param(20.0, "SN_TI_AGAIN", "Then that of the open alone for so long", "s", 0.0, 600.0)
     calm_m_s2: float = param(
         0.15, "SN_TI_CALM", "Push of the wind from which margins stay as in the open", "m/s^2", 0.0, 10.0
     )

@@ -119,7 +119,7 @@ def act(pending: Pending, answer: Answer | None, judge: Judge = check) -> tuple[
     yaw_sp = memory.yaw_sp_rad if steered.setpoint.yaw_rad is None else steered.setpoint.yaw_rad
     memory = replace(steered.memory, engaged=steered.engaged, yaw_sp_rad=yaw_sp)
     verdict = None if steered.decision is None else steered.decision.verdict
-    memory = tightness.noticed(memory, percept, verdict, scene.params)
+    memory = tightness.noticed(memory, percept, verdict, pending.goal_m, scene.params)
     flown_s = steered.engaged.arbiter.t_s - engaged.engaged_t_s
     bound = arbiter.switch_bound(flown_s, scene.params.arbiter, steered.engaged.arbiter.aborts)
     record = Record(

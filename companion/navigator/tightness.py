@@ -3,7 +3,9 @@
 Open air wants cells of 20 cm and decimetres of margin, a gap of 75 cm wants cells of 5 cm and centimetres. No set does
 both, so the navigator has two: its own, and the profile that ``tight.profile`` names. A Schmitt trigger with a dwell
 decides: tight where much is blocked near by, or where nothing that was proposed could be flown; open again where little
-is. A learned policy without a guard keeps the set that it was trained with.
+is. In a dead end the two would lead to and fro, as the tight set's map soon forgets: where the goal comes no nearer for
+a while the open set goes on alone, and later both again. A learned policy without a guard keeps the set that it was
+trained with.
 
 Centimetres are for calm air. What the wind does to the vehicle is the acceleration that its tilt and its own drag do
 not account for; where that is more than ``calm_m_s2``, the margins stay those of the open.
@@ -28,6 +30,7 @@ from companion.policy.expert import GeometricExpert
 
 GRAVITY_M_S2 = 9.81
 PUSH_TAU_S = 1.0  # the push of the wind is averaged over
+NEARER_M = 0.5  # what counts as nearer to the goal
 STILL = 0.7  # of ``calm_m_s2``: below this it is calm again
 UPRIGHT = 0.5  # least cosine of the tilt that is reckoned with
 STUCK = (VerdictKind.ESCAPE, VerdictKind.REFUSED)
@@ -60,26 +63,33 @@ def felt(now: Tightness, before: VehicleState | None, state: VehicleState, rule:
     return replace(now, push_ne_m_s2=(north, east), calm=calm)
 
 
-def noticed(memory: Memory, percept: Percept, verdict: Verdict | None, params: Params) -> Memory:
+def noticed(memory: Memory, percept: Percept, verdict: Verdict | None, goal_m: float, params: Params) -> Memory:
     """After a tick: the map for the next one, which says which set flies it.
 
     Args:
         memory: with the state and the map of this tick.
         percept: of this tick.
         verdict: where a decision was made.
+        goal_m: distance to the goal.
         params: the set in force.
     """
     rule, now, state = params.tight, memory.tight, memory.state
     by_expert = params.policy.guard or params.policy.name == GeometricExpert.name
-    if not rule.profile or not by_expert or memory.t_s - now.since_t_s < rule.dwell_s:
+    if not rule.profile or not by_expert:
+        return memory
+    if goal_m < now.best_m - NEARER_M:
+        now = replace(now, best_m=goal_m, best_t_s=memory.t_s)
+        memory = replace(memory, tight=now)
+    if memory.t_s - now.since_t_s < rule.dwell_s:
         return memory
     if state is None or state.t_s < memory.t_s:  # a tick without a state that could be believed
         return memory
     density = local_density(percept.bearing_range_m, rule.radius_m)
     stuck = verdict is not None and verdict.kind in STUCK
-    if now.aside is None and (density >= rule.density_enter or stuck):
+    in_vain = (memory.t_s - now.best_t_s) % (rule.vain_s + rule.again_s) >= rule.vain_s
+    if now.aside is None and not in_vain and (density >= rule.density_enter or stuck):
         onto, aside = empty(tight_set(params).map), memory.grid
-    elif now.aside is not None and density <= rule.density_exit and not stuck:
+    elif now.aside is not None and (in_vain or (density <= rule.density_exit and not stuck)):
         onto, aside = now.aside, None
     else:
         return memory

@@ -76,6 +76,15 @@ def test_two_changes_are_never_nearer_than_the_dwell(stays: list[int]) -> None:
     assert all(b - a >= BOTH.tight.dwell_s - 1e-6 for a, b in itertools.pairwise(changes_s))
 
 
+def test_where_the_goal_comes_no_nearer_the_open_set_has_its_turn_and_later_the_other_again() -> None:
+    pilot = Pilot(CLOSE, params=BOTH)
+    seen = [(pilot.t_s, is_tight(pilot)) for _ in range(round(30.0 / 0.04)) if pilot.tick()]
+    until_s, again_s = BOTH.tight.vain_s, BOTH.tight.vain_s + BOTH.tight.again_s
+    assert all(tight for t_s, tight in seen if 1.0 < t_s - seen[0][0] < until_s - 0.1)
+    assert not any(tight for t_s, tight in seen if until_s + 0.1 < t_s - seen[0][0] < again_s - 0.1)
+    assert all(tight for t_s, tight in seen if t_s - seen[0][0] > again_s + 0.1)
+
+
 def test_hits_are_taken_along_both_ways_and_the_open_map_is_kept() -> None:
     pilot = Pilot(OPEN, params=BOTH)
     pilot.ticks(10)
