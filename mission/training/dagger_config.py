@@ -34,8 +34,8 @@ class DaggerConfig:
     observation: str = "map"  # see ``companion.policy.observations``
     hidden: tuple[int, ...] = (256, 256)
     seed: int = 1
-    rounds: int = 5
-    flights: int = 40  # a round
+    rounds: int = 6
+    flights: int = 60  # a round
     expert_share: tuple[float, ...] = (1.0, 0.3, 0.1, 0.0)  # of the decisions, by round; the last holds on
     random_share: float = 0.05
     steps: int = 4000  # of a cloning
