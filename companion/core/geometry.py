@@ -183,6 +183,15 @@ def nearest_distance(path_ned_m: F64, points_ned_m: F64, reach_m: float = math.i
     return nearest if nearest <= reach_m else math.inf
 
 
+def shortened(north: float, east: float, most: float) -> tuple[float, float]:
+    """The vector, no longer than ``most``; zero if it is not finite."""
+    size = math.hypot(north, east)
+    if not 0.0 < size < math.inf:
+        return 0.0, 0.0
+    share = min(1.0, most / size)
+    return north * share, east * share
+
+
 def required_distance(start_ned_m: F64, points_ned_m: F64, radius_m: float, floor_m: float = 0.0) -> F64:
     """Distance (n,) that a disc leaving ``start`` must keep from each point.
 

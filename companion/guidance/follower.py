@@ -71,9 +71,9 @@ def follow(
     here_n, here_e = float(state.pos_ned_m[0]), float(state.pos_ned_m[1])
     if not at.distance_m < math.inf:
         here_n, here_e = place_n, place_e
-    off_n, off_e = _limited(place_n - here_n, place_e - here_e, params.offset_max_m)
+    off_n, off_e = geometry.shortened(place_n - here_n, place_e - here_e, params.offset_max_m)
     want_n, want_e = vel_n + params.pull_1_s * off_n, vel_e + params.pull_1_s * off_e
-    acc_n, acc_e = _limited(
+    acc_n, acc_e = geometry.shortened(
         params.acc_gain_1_s * (want_n - float(state.vel_ned_m_s[0])),
         params.acc_gain_1_s * (want_e - float(state.vel_ned_m_s[1])),
         params.acc_max_m_s2,
@@ -107,15 +107,6 @@ def _velocity(
 
 def _place(pieces: tuple[geometry.Segment, ...], s_m: float, path_ned_m: F64) -> tuple[float, float]:
     return geometry.place_at(pieces, s_m) if pieces else (float(path_ned_m[0, 0]), float(path_ned_m[0, 1]))
-
-
-def _limited(north: float, east: float, most: float) -> tuple[float, float]:
-    """The vector, shortened to ``most``; zero for NaN."""
-    size = math.hypot(north, east)
-    if not size > 0.0:
-        return 0.0, 0.0
-    share = min(1.0, most / size)
-    return north * share, east * share
 
 
 def _share_off_path(distance_m: float, params: FollowerParams) -> float:

@@ -209,7 +209,8 @@ def hold(
         if elapsed < whole:
             vel[:2] = course * (speed - params.ramp_m_s2 * elapsed)
             acc[:2] = course * -params.ramp_m_s2
-        acc[:2] = _bounded(acc[:2] + params.hold_gain_1_s * (vel[:2] - state.vel_ned_m_s[:2]), params.decel_m_s2)
+        push = acc[:2] + params.hold_gain_1_s * (vel[:2] - state.vel_ned_m_s[:2])
+        acc[:2] = geometry.shortened(float(push[0]), float(push[1]), params.decel_m_s2)
     return kept, Setpoint(state.t_s, pos, vel, acc, kept.yaw_rad)
 
 
@@ -228,14 +229,6 @@ def _corner(before: geometry.Segment, after: geometry.Segment, cut_m: float) -> 
     by_cut = cut_m / (1.0 / math.cos(half_angle) - 1.0)
     radius = min(by_cut, half_piece / math.tan(half_angle))
     return radius, radius * math.tan(half_angle)
-
-
-def _bounded(vector: F64, most: float) -> F64:
-    """The vector (2,), no longer than ``most``; zero if it is not finite."""
-    size = math.hypot(float(vector[0]), float(vector[1]))
-    if not math.isfinite(size):
-        return np.zeros(2)
-    return vector if size <= most else vector * (most / size)
 
 
 def _known(value: float) -> float:

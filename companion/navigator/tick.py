@@ -155,7 +155,8 @@ def _standby(memory: Memory, state: VehicleState) -> tuple[Memory, Setpoint]:
     if memory.state is None:
         return memory, Setpoint(state.t_s, None, np.zeros(3), None, None)  # wherever it is: stay
     yaw = yaw_rad(state.q_ned_frd)
-    memory = replace(memory, engaged=None, policy=None, guard=None, yaw_sp_rad=yaw)
+    tight = replace(memory.tight, best_m=math.inf)  # the next flight may begin anywhere
+    memory = replace(memory, engaged=None, policy=None, guard=None, yaw_sp_rad=yaw, tight=tight)
     return memory, Setpoint(state.t_s, state.pos_ned_m.copy(), None, None, yaw)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from companion import navigator
 from companion.arbiter.facts import Facts, landable, landing_safe, thresholds
-from companion.core import gridmap
+from companion.core import geometry, gridmap
 from companion.core.frames import yaw_rad
 from companion.core.gridmap import GridMap
 from companion.core.inputs import Inputs
@@ -179,11 +179,8 @@ def velocity_setpoint(view: View, velocity_ne_m_s: F64, yaw_rad: float) -> Setpo
 
 
 def shortened(vector: F64, most: float) -> F64:
-    """The vector (2,), no longer than ``most``; zero for NaN."""
-    size = math.hypot(float(vector[0]), float(vector[1]))
-    if not size > 0.0:
-        return np.zeros(2)
-    return np.asarray(vector * min(1.0, most / size), np.float64)
+    """The vector (2,), no longer than ``most``; zero if it is not finite."""
+    return np.array(geometry.shortened(float(vector[0]), float(vector[1]), most))
 
 
 def _steered(

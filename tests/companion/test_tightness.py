@@ -85,6 +85,15 @@ def test_where_the_goal_comes_no_nearer_the_open_set_has_its_turn_and_later_the_
     assert all(tight for t_s, tight in seen if t_s - seen[0][0] > again_s + 0.1)
 
 
+def test_what_was_in_vain_does_not_count_once_a_pilot_has_had_the_vehicle() -> None:
+    pilot = Pilot(CLOSE, params=BOTH)
+    pilot.ticks(round((BOTH.tight.vain_s + 3.0) / 0.04))
+    assert not is_tight(pilot)
+    pilot.tick(status=HOVERING)
+    pilot.ticks(2)
+    assert is_tight(pilot)
+
+
 def test_hits_are_taken_along_both_ways_and_the_open_map_is_kept() -> None:
     pilot = Pilot(OPEN, params=BOTH)
     pilot.ticks(10)
