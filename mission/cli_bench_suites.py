@@ -24,6 +24,7 @@ Worlds = Annotated[Path | None, typer.Option("--worlds", metavar="FOLDER", help=
 Part = Annotated[str, typer.Option("--part", help="Of BARN's worlds: all, tuning, or kept (never tuned on).")]
 PilotName = Annotated[str, typer.Option("--pilot", help="Who flies; 'all': every pilot in turn.")]
 Runs = Annotated[int | None, typer.Option("--runs", min=1, help="Of each cell; default: the suite's own number.")]
+CellText = Annotated[str, typer.Option("--cell", metavar="TEXT", help="Only cells with this in their names.")]
 Jobs = Annotated[int, typer.Option("--jobs", min=1, max=256, help="Processes.")]
 Cluster = Annotated[str | None, typer.Option(metavar="ADDRESS", help="Fly on this Ray cluster; 'local': a Ray here.")]
 StressName = Annotated[str, typer.Option("--stress", help="noise, dropouts, latency, gusts, drift, blind; or none.")]
@@ -39,6 +40,7 @@ class Asked:
 
     pilot: str
     runs: int | None
+    cell: str
     jobs: int
     cluster: str | None
     stress: str
@@ -65,6 +67,7 @@ def _command(name: str) -> Any:
     def fly(
         pilot: PilotName = DEFAULT,
         runs: Runs = None,
+        cell: CellText = "",
         jobs: Jobs = 1,
         cluster: Cluster = None,
         stress: StressName = "none",
@@ -75,7 +78,8 @@ def _command(name: str) -> Any:
         out: Out = OUT,
         json: Json = False,
     ) -> None:
-        _fly(name, None, "all", Asked(pilot, runs, jobs, cluster, stress, guard, profile, param, stiff, out, json))
+        asked = Asked(pilot, runs, cell, jobs, cluster, stress, guard, profile, param, stiff, out, json)
+        _fly(name, None, "all", asked)
 
     return fly
 
@@ -96,7 +100,7 @@ def barn(
     json: Json = False,
 ) -> None:
     """BARN's worlds, one to one, by BARN's formula."""
-    _fly("barn", worlds, part, Asked(pilot, runs, jobs, cluster, stress, guard, profile, param, stiff, out, json))
+    _fly("barn", worlds, part, Asked(pilot, runs, "", jobs, cluster, stress, guard, profile, param, stiff, out, json))
 
 
 def all_suites(
@@ -121,7 +125,7 @@ def all_suites(
 
         SuiteSpec("barn", worlds, part).load()  # hours before its turn
     for name in names:
-        _fly(name, worlds, part, Asked(pilot, runs, jobs, cluster, "none", guard, profile, param, stiff, out, json))
+        _fly(name, worlds, part, Asked(pilot, runs, "", jobs, cluster, "none", guard, profile, param, stiff, out, json))
 
 
 def report(
@@ -158,7 +162,7 @@ def _fly(suite: str, worlds: Path | None, part: str, asked: Asked) -> None:
     stress, guard = stress_named(asked.stress), parse_switch(asked.guard, "--guard")
     pilots = pilot_names() if asked.pilot == "all" else [pilot_named(asked.pilot).name]
     spec = SuiteSpec(suite, worlds, part)
-    made = spec.load()
+    made = spec.load().only(asked.cell)
     for skipped in made.skipped:
         console.print(f"skipped {skipped.name}: {skipped.reason}", markup=False)
     for pilot in pilots:

@@ -52,6 +52,7 @@ def entry_folder(out: Path, spec: SuiteSpec, entry: Entry) -> Path:
     parts += [entry.stress] if entry.stress != "none" else []
     parts += ["stiff"] if entry.px4_params else []
     parts += [] if entry.guard else ["alone"]
+    parts += [_plain(f"{name}={value}") for fields in entry.overrides.values() for name, value in fields.items()]
     return out / suite / "_".join(parts)
 
 
@@ -137,8 +138,12 @@ def _setup(path: Path) -> dict[str, Any]:
 
 def _keep_picture(folder: Path, run: Run) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    cell = "".join(c if c.isalnum() or c in ".-" else "_" for c in run.row.cell)
-    (folder / f"{cell}_{run.row.run:04d}.png").write_bytes(run.picture or b"")
+    (folder / f"{_plain(run.row.cell)}_{run.row.run:04d}.png").write_bytes(run.picture or b"")
+
+
+def _plain(text: str) -> str:
+    """As it may stand in the name of a file."""
+    return "".join(c if c.isalnum() or c in ".-=" else "_" for c in text)
 
 
 @dataclass(frozen=True, slots=True)

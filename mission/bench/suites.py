@@ -107,6 +107,14 @@ class Suite:
     runs: int  # of each cell, unless asked otherwise
     skipped: tuple[Skipped, ...] = ()
 
+    def only(self, text: str) -> "Suite":
+        """The suite with the cells that have ``text`` in their names. Raises InputError where none has."""
+        chosen = tuple(cell for cell in self.cells if text in cell.name)
+        if not chosen:
+            names = ", ".join(f"'{cell.name}'" for cell in self.cells)
+            raise InputError(f"--cell '{text}': suite '{self.name}' has {names}")
+        return replace(self, cells=chosen)
+
 
 def suite_names() -> list[str]:
     """In the order of the report."""

@@ -198,9 +198,11 @@ def test_entries_have_folders_of_their_own(tmp_path):
             Entry(px4_params={"MPC_XY_P": 1.5}),
             Entry("forest"),
             Entry("forest", guard=False),
+            Entry(overrides={"limits": {"clamp": False}}),
+            Entry(overrides={"limits": {"tau_s": 0.3}}),
         )
     }
-    assert len(folders) == 6
+    assert len(folders) == 8
     assert {folder.parent.name for folder in folders} == {"barn_kept"}
 
 

@@ -36,6 +36,14 @@ def test_barn_wants_a_folder():
         suite_named("barn")
 
 
+def test_a_part_of_a_suites_cells_is_flown_by_their_names():
+    forest = suite_named("forest")
+    assert [cell.name for cell in forest.only("at 10 m/s").cells] == [f"{name} at 10 m/s" for name in FOREST_PER_M2]
+    assert forest.only("") == forest
+    with pytest.raises(InputError, match="--cell '9 m/s': suite 'pole' has '3 m/s'"):
+        suite_named("pole").only("9 m/s")
+
+
 def test_suites_have_the_cells_of_the_set_ups():
     assert len(suite_named("forest").cells) == len(FOREST_PER_M2) * len(FOREST_M_S) == 15
     assert [cell.name for cell in suite_named("pole").cells] == [f"{v:g} m/s" for v in POLE_M_S]
