@@ -10,10 +10,11 @@ the time that a decision took. So both discount by the decision, with one consta
 
 import argparse
 import json
+import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -203,18 +204,26 @@ def overlap(one: Interval, other: Interval) -> bool:
 
 def main() -> int:
     """Print a line a seed and side, then the intervals."""
-    parser = argparse.ArgumentParser(description="Our TD3 beside stable-baselines3's.")
+    parser = argparse.ArgumentParser(
+        description="Our TD3 beside stable-baselines3's.",
+        epilog="example: python -m mission.training.compare_sb3 --seeds 5 --json",
+    )
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--episodes", type=int, default=60)
     parser.add_argument("--greedy", type=int, default=10, help="flights after training")
+    parser.add_argument("--json", action="store_true", help="one object in place of the last lines")
     asked = parser.parse_args()
-    found = compare(asked.seeds, asked.episodes, asked.greedy, lambda line: print(line, flush=True))
-    same = []
-    for name in ("success", "greedy"):
-        ours, theirs = (found[side][name] for side in SIDES)
-        same.append(overlap(ours, theirs))
-        print(f"{name:8} ours {_text(ours)}, sb3 {_text(theirs)}: {'overlap' if same[-1] else 'apart'}")
-    return 0 if all(same) else 1
+    lines = sys.stderr if asked.json else sys.stdout
+    found = compare(asked.seeds, asked.episodes, asked.greedy, lambda line: print(line, file=lines, flush=True))
+    same = {name: overlap(*(found[side][name] for side in SIDES)) for name in ("success", "greedy")}
+    if asked.json:
+        rows = {side: {name: asdict(interval) for name, interval in found[side].items()} for side in SIDES}
+        print(json.dumps({**rows, "overlap": same}))
+    else:
+        for name, overlaps in same.items():
+            ours, theirs = (_text(found[side][name]) for side in SIDES)
+            print(f"{name:8} ours {ours}, sb3 {theirs}: {'overlap' if overlaps else 'apart'}")
+    return 0 if all(same.values()) else 1
 
 
 def _trained(
