@@ -3,8 +3,9 @@
 Two questions about every velocity that might be asked for now. May it be: braking one tick later, would the vehicle
 stand before anything that moves can be where it is? That is passive safety (Macek et al. 2009; Bouraine, Fraichard,
 Salhi 2012). Which is the best of those: near to the velocity wanted, and long free of contact if everything goes on as
-now, as with velocity obstacles (Fiorini, Shiller 1998)? Where none may be asked for: brake. What comes then comes to a
-vehicle that stands.
+now, as with velocity obstacles (Fiorini, Shiller 1998)? Where none may be asked for, and what comes is near: out of the
+way (``dodge``), if everything going on as now leaves room for that; else brake. What comes then comes to a vehicle that
+stands.
 """
 
 import math
@@ -26,6 +27,8 @@ STATIC_S = 1.0  # off the planned way, so long must stay free of what stands
 SETTLE_S = 0.15  # the last of the speed goes more slowly
 ACC_GAIN_1_S = 2.2  # acceleration asked for per velocity that is missing
 SOON_S = 0.05  # no contact counts as sooner
+DODGE_S = 1.5  # a velocity out of the way is good for so long; the next tick asks again
+DODGE_M_PER_M_S = 0.1  # room that being slower may cost
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +43,7 @@ class YieldParams:
     room_m: float = param(0.1, "SN_YL_ROOM", "kept between hull and what moves", "m", 0.0, 1.0)
     turn: float = param(1.0, "SN_YL_TURN", "share of its speed with which it may turn back at once", "", 0.0, 1.0)
     weight_m: float = param(6.0, "SN_YL_WEIGHT", "cost of a contact soon against a change of velocity", "m", 0.0, 50.0)
+    dodge: bool = param(False, "SN_YL_DODGE", "what comes too near to stand for is gone out of the way of")
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +87,7 @@ def give_way(
     centres = moving.pos_ne_m - here
     safe = _stands_in_time(vel, asked, centres, moving, static, hull, params)
     if not safe.any():
-        return np.zeros(2)
+        return _aside(vel, asked, centres, moving, static, hull, params) if params.dodge else np.zeros(2)
     free_s = _free_s(vel, asked, centres, moving, static, hull.radius_m, params)
     cost = np.hypot(*(asked - wanted_ne_m_s).T)
     cost += params.weight_m * (1.0 / np.maximum(free_s, SOON_S) - 1.0 / params.ahead_s)
@@ -143,15 +147,41 @@ def _free_s(
     The planned way is known to lead past what stands, off it the next second must.
     """
     times = params.ahead_s * (np.arange(LOOK_STEPS) + 1) / LOOK_STEPS
-    change = asked - vel
-    places = vel * times[:, None] + change[:, None] * _share(np.hypot(*change.T), times, params)[..., None]
-    there = centres + moving.vel_ne_m_s * times[:, None, None]  # (t, m, 2)
-    met: NDArray[np.bool_] = np.any(_apart(places, there) < radius_m + moving.radius_m + params.room_m, axis=2)
+    places = _places(vel, asked, times, params)
+    met = _from_movers(places, times, centres, moving) < radius_m + params.room_m
     soon = times <= STATIC_S
-    blocked = _apart(places[len(SHARES) :, soon], static) < radius_m + params.room_m
-    met[len(SHARES) :, soon] |= np.any(blocked, axis=2)
+    met[len(SHARES) :, soon] |= _from_static(places[len(SHARES) :, soon], static) < radius_m + params.room_m
     first = np.where(met.any(axis=1), met.argmax(axis=1), LOOK_STEPS - 1)
     return times[first]
+
+
+def _aside(vel: F64, asked: F64, centres: F64, moving: Moving, static: F64, hull: Hull, params: YieldParams) -> F64:
+    """The velocity (2,) that stays farthest from everything that goes on as now; zero where that is too near."""
+    times = DODGE_S * (np.arange(LOOK_STEPS) + 1) / LOOK_STEPS
+    places = _places(vel, asked, times, params)
+    room = _from_movers(places, times, centres, moving).min(axis=1)
+    room = np.minimum(room, _from_static(places[:, times <= STATIC_S], static).min(axis=1))
+    best = int(np.argmax(room - DODGE_M_PER_M_S * np.hypot(*asked.T)))
+    return asked[best] if room[best] >= hull.radius_m + params.room_m else np.zeros(2)
+
+
+def _places(vel: F64, asked: F64, times: F64, params: YieldParams) -> F64:
+    """(c, t, 2) where the vehicle is then, from here."""
+    change = asked - vel
+    return vel * times[:, None] + change[:, None] * _share(np.hypot(*change.T), times, params)[..., None]
+
+
+def _from_movers(places: F64, times: F64, centres: F64, moving: Moving) -> F64:
+    """(c, t) distance to the nearest surface of what goes on as now; inf if there is nothing."""
+    there = centres + moving.vel_ne_m_s * times[:, None, None]  # (t, m, 2)
+    nearest: F64 = _apart(places, there).min(axis=2, initial=math.inf)
+    return nearest - moving.radius_m
+
+
+def _from_static(places: F64, static: F64) -> F64:
+    """(c, t) distance to the nearest of what stands; inf if there is nothing."""
+    nearest: F64 = _apart(places, static).min(axis=2, initial=math.inf)
+    return nearest
 
 
 def _share(size: F64, times: F64, params: YieldParams) -> F64:

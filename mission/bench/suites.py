@@ -71,11 +71,12 @@ FOREST_PARAMS: Final[dict[str, dict[str, Any]]] = {
         "swerve_m_s2": 6.0,
     },
 }
-# As profile 'crowd': no speed from which the vehicle would not stand before what moves can be where it is.
+# As profile 'crowd': no speed from which the vehicle would not stand before what moves can be where it is; what comes
+# nearer than that is gone out of the way of.
 YARD_PARAMS: Final[dict[str, dict[str, Any]]] = {
     "tight": ONE_SET,
     "movers": {"again_m": 0.45, "link_m": 0.5, "ahead_s": 1.5},
-    "yielding": {"ahead_s": 3.0, "weight_m": 10.0},
+    "yielding": {"ahead_s": 3.0, "weight_m": 10.0, "dodge": True},
 }
 YARD_RULES: Final = Rules(
     speed_m_s=2.0,

@@ -12,6 +12,7 @@ from companion.core.types import F64, VehicleState
 from companion.guidance.yielding import Hull, Moving, YieldParams, give_way, setpoint
 
 PARAMS = YieldParams(ahead_s=3.0, weight_m=10.0)
+DODGING = dataclasses.replace(PARAMS, dodge=True)
 HULL = Hull(0.33, 2.0, 0.04)
 MOVER_M = 0.4
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
@@ -34,9 +35,10 @@ def chosen(
     vel: tuple[float, float] = (0.0, 0.0),
     wanted: tuple[float, float] = (0.0, 0.0),
     static: F64 = NOTHING,
+    params: YieldParams = PARAMS,
 ) -> F64:
     """The velocity that is asked for in the end."""
-    other = give_way(state(vel=vel), np.array(wanted), moving, static, HULL, PARAMS)
+    other = give_way(state(vel=vel), np.array(wanted), moving, static, HULL, params)
     return np.array(wanted) if other is None else other
 
 
@@ -103,6 +105,37 @@ def test_passive_safety_what_touches_it_touches_a_vehicle_that_stands(rows, vel,
             aim = asked if t_s < PARAMS.lag_s + HULL.step_s else np.zeros(2)
             change = aim - speed
             speed = speed + change * min(1.0, PARAMS.acc_m_s2 * TICK_S / max(math.hypot(*change), 1e-12))
+
+
+def test_what_comes_too_near_to_stand_for_is_dodged_where_there_is_room() -> None:
+    near = movers((1.2, 0.3, -1.0, 0.0))
+    assert chosen(near).tolist() == [0.0, 0.0]
+    aside = chosen(near, params=DODGING)
+    assert aside[0] < -0.5 and aside[1] < -0.3
+    walls = np.array([[north / 4, side * 0.5] for north in range(-12, 4) for side in (-1, 1)])
+    straight_back = chosen(near, static=walls, params=DODGING)
+    assert straight_back[0] < -0.5 and abs(straight_back[1]) < 1e-6
+
+
+@given(
+    st.lists(st.tuples(PLACE, PLACE, SPEED, SPEED), min_size=1, max_size=4),
+    st.tuples(SPEED, SPEED),
+    st.tuples(SPEED, SPEED),
+)
+@settings(max_examples=150, deadline=None)
+def test_a_dodge_keeps_clear_of_everything_that_goes_on_as_now(rows, vel, wanted) -> None:
+    moving = movers(*rows)
+    asked = chosen(moving, vel, wanted, params=DODGING)
+    if chosen(moving, vel, wanted).any() or not asked.any():
+        return  # not a dodge
+    pos, speed = np.zeros(2), np.array(vel)
+    for k in range(1, int(1.5 / TICK_S)):
+        if TICK_S * k > PARAMS.lag_s:
+            change = asked - speed
+            speed = speed + change * min(1.0, PARAMS.acc_m_s2 * TICK_S / max(math.hypot(*change), 1e-12))
+        pos = pos + speed * TICK_S
+        away = [math.dist((n + vn * TICK_S * k, e + ve * TICK_S * k), pos) for n, e, vn, ve in rows]
+        assert min(away) > HULL.radius_m + MOVER_M - 0.05  # looked at every 0.125 s
 
 
 @given(st.tuples(SPEED, SPEED), st.tuples(SPEED, SPEED))
