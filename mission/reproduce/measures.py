@@ -32,6 +32,7 @@ LAST_SHARE = 50  # episodes over which late success is counted
 LEAST_GAIN_M = 1.0  # a track that gained less counts as this: going nowhere is a long detour, not an endless one
 CONFIDENCE = 0.95
 SHARES = ("reached", "success_last50", "contact", "rl_share", "greedy_success", "greedy_contact")
+COUNTS = ("episodes", "successes", "successes_first100", "ticks", "switches", "above_bound", "hasty", "wall_s")
 STAMP = ("date", "commit", "machine")
 
 
@@ -118,11 +119,12 @@ def over_seeds(values: Sequence[float | None]) -> Interval | None:
 
 
 def interval_of(seeds: Sequence[Figures], name: str) -> Interval | None:
-    """A figure over seeds; the interval of a share stays in [0, 1]."""
+    """A figure over seeds; the interval of a share stays in [0, 1], that of a count above 0."""
     found = over_seeds([seed.get(name) for seed in seeds])
-    if found is None or found.low is None or found.high is None or name not in SHARES:
+    if found is None or found.low is None or found.high is None or name not in (*SHARES, *COUNTS):
         return found
-    return Interval(found.mean, max(found.low, 0.0), min(found.high, 1.0), found.seeds)
+    high = min(found.high, 1.0) if name in SHARES else found.high
+    return Interval(found.mean, max(found.low, 0.0), high, found.seeds)
 
 
 def smooth(values: Sequence[float]) -> F64:

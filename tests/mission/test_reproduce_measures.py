@@ -11,7 +11,7 @@ from reproduce_kit import GOAL_NE_M, SWIFT, write_arm
 
 from mission.reproduce.arms import load_table
 from mission.reproduce.greedy import gained_m, turning_deg_per_m
-from mission.reproduce.measures import SeedRows, figures_of, over_seeds, read_seed, smooth
+from mission.reproduce.measures import SeedRows, figures_of, interval_of, over_seeds, read_seed, smooth
 from mission.reproduce.plots import band
 from mission.reproduce.run import arm_folder
 from mission.training.until import Until
@@ -91,6 +91,15 @@ def test_what_no_seed_knows_has_no_interval() -> None:
     one = over_seeds([None, 2.0])
     assert one is not None
     assert (one.mean, one.low, one.seeds) == (2.0, None, 1)
+
+
+def test_shares_and_counts_stay_where_they_can_be() -> None:
+    seeds = [{"contact": share, "successes": count, "return_late": -count} for share, count in ((0.0, 0.0), (0.9, 1.0))]
+    share, count, total = (interval_of(seeds, name) for name in ("contact", "successes", "return_late"))
+    assert share is not None and count is not None and total is not None
+    assert (share.low, share.high) == (0.0, 1.0)
+    assert count.low == 0.0 and count.high is not None and count.high > 1.0
+    assert total.low is not None and total.low < -1.0
 
 
 def test_the_smooth_curve_has_whole_windows_only() -> None:
