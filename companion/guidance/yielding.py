@@ -43,7 +43,7 @@ class YieldParams:
     room_m: float = param(0.1, "SN_YL_ROOM", "kept between hull and what moves", "m", 0.0, 1.0)
     turn: float = param(1.0, "SN_YL_TURN", "share of its speed with which it may turn back at once", "", 0.0, 1.0)
     weight_m: float = param(6.0, "SN_YL_WEIGHT", "cost of a contact soon against a change of velocity", "m", 0.0, 50.0)
-    dodge: bool = param(False, "SN_YL_DODGE", "what comes too near to stand for is gone out of the way of")
+    dodge: bool = param(False, "SN_YL_DODGE", "go out of the way of what comes too near to stand for")
 
 
 @dataclass(frozen=True, slots=True)
