@@ -71,8 +71,8 @@ FOREST_PARAMS: Final[dict[str, dict[str, Any]]] = {
         "swerve_m_s2": 6.0,
     },
 }
-# As profile 'crowd': no speed from which the vehicle would not stand before what moves can be where it is; out of the way
-# of what comes nearer than that.
+# As profile 'crowd': no speed from which the vehicle would not stand before what moves can be where it is; and out of
+# the way of what comes nearer than that.
 YARD_PARAMS: Final[dict[str, dict[str, Any]]] = {
     "tight": ONE_SET,
     "movers": {"again_m": 0.45, "link_m": 0.5, "ahead_s": 1.5},
