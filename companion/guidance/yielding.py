@@ -28,6 +28,7 @@ SETTLE_S = 0.15  # the last of the speed goes more slowly
 ACC_GAIN_1_S = 2.2  # acceleration asked for per velocity that is missing
 SOON_S = 0.05  # no contact counts as sooner
 DODGE_S = 1.5  # a velocity out of the way is good for so long; the next tick asks again
+DODGE_STEPS = 24  # fewer, and what passes between two of them seems to leave room
 DODGE_M_PER_M_S = 0.1  # room that being slower may cost
 
 
@@ -157,7 +158,7 @@ def _free_s(
 
 def _aside(vel: F64, asked: F64, centres: F64, moving: Moving, static: F64, hull: Hull, params: YieldParams) -> F64:
     """The velocity (2,) that stays farthest from everything that goes on as now; zero where that is too near."""
-    times = DODGE_S * (np.arange(LOOK_STEPS) + 1) / LOOK_STEPS
+    times = DODGE_S * (np.arange(DODGE_STEPS) + 1) / DODGE_STEPS
     places = _places(vel, asked, times, params)
     room = _from_movers(places, times, centres, moving).min(axis=1)
     room = np.minimum(room, _from_static(places[:, times <= STATIC_S], static).min(axis=1))
